@@ -1,0 +1,66 @@
+// The certificate: rigorous bounds on the gap from one pair of surface points, whatever way they were found.
+//
+// Let every normal curvature radius of body K lie in [rho_K, P_K] (near kinked joints: geometry/rolling.h).
+// By Blaschke's rolling theorem a ball of radius rho_K rolls freely inside K, and K rolls freely inside a
+// ball of radius P_K. Hence, for a on A with outward normal na and b on B with nb:
+//   * a' = a - rho_A na and b' = b - rho_B nb lie in the inner parallel bodies ("cores") of A and B. As
+//     h_K = h_core + rho_K |d|, the gap is the signed distance of the cores less rho_A + rho_B, so
+//         gap <= |b' - a'| - rho_A - rho_B.
+//     For overlaps shallower than rho_A + rho_B the cores are disjoint convex bodies: the minimiser is
+//     unique, and a stationary pair is the global answer.
+//   * A lies in the ball of radius P_A that touches at a, so h_A(d) <= d.a + P_A (1 - d.na), likewise B, and
+//         gap >= -p(d) >= d.(b - a) - P_A (1 - d.na) - P_B (1 + d.nb)      for every unit d.
+// With d = (b' - a') / |b' - a'| the bracket is (P_A - rho_A)(1 - d.na) + (P_B - rho_B)(1 + d.nb) wide:
+// quadratic in the angles between the normals and d, and zero for spheres at once.
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+
+#include "contact/pair_frame.h"
+#include "geometry/tolerances.h"
+
+namespace nurbs {
+
+struct Bracket {
+  double lower, upper;  // of the gap
+  Vec3 direction;       // the unit d the lower bound was taken along
+  double angle2;  // larger squared angle between d and a normal: the points' error after a Newton step is of
+                  // its order
+  double unique;  // rho_A + rho_B: a shallower overlap has no other minimiser
+  double width() const { return upper - lower; }
+};
+
+// Excess of h(d) over d . (surface point with normal n): P (1 - cos) by the rolling ball; where that is
+// infinite (flats, grooves), at most the slope of the tangent plane times the diameter.
+inline double support_excess(const Shape& shape, double scale, const RollingRadii& radii, const Vec3& d,
+                             const Vec3& n) {
+  const double chord2 = (d - n).squaredNorm();  // 2 (1 - cos), without cancellation
+  const double rolling = 0.5 * radii.outer * chord2;
+  const double wedge = 2 * shape.bounding_radius * std::sqrt(chord2);
+  return scale * ((rolling < wedge ? rolling : wedge) + radii.slack);
+}
+
+inline Bracket certify(const PairFrame& pair, const PointPair& p) {
+  const RollingRadii radii_a = rolling_radii(*pair.a, p.on_a), radii_b = rolling_radii(*pair.b, p.on_b);
+  // A flat part has no largest ball; one as large as the other body's reach does.
+  const double rho_a = std::min(pair.scale_a * radii_a.inner, pair.reach);
+  const double rho_b = std::min(pair.scale_b * radii_b.inner, pair.reach);
+  const Vec3 core = (p.b - rho_b * p.nb) - (p.a - rho_a * p.na);
+  const double distance = core.norm();
+  const Vec3 mean = p.na - p.nb;
+  Bracket bracket;
+  // Cores this close have no direction of their own; along the normals the bracket is at most 2 |core| wide.
+  const bool apart = core.dot(mean) > 0 && distance > kNoDirection * pair.reach;
+  bracket.direction = apart ? Vec3(core / distance) : Vec3(mean.normalized());
+  const Vec3& d = bracket.direction;
+  const double roundoff = kRoundoff * pair.reach;
+  bracket.angle2 = std::max((d - p.na).squaredNorm(), (d + p.nb).squaredNorm());
+  bracket.unique = rho_a + rho_b;
+  bracket.upper = distance - rho_a - rho_b + roundoff;
+  bracket.lower = d.dot(p.b - p.a) - support_excess(*pair.a, pair.scale_a, radii_a, d, p.na) -
+                  support_excess(*pair.b, pair.scale_b, radii_b, -d, p.nb) - roundoff;
+  return bracket;
+}
+
+}  // namespace nurbs

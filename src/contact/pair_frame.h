@@ -1,0 +1,43 @@
+// Two placed bodies seen from body A: lengths of the lab, axes of A's shape, origin at A's centre of mass.
+// Solving there keeps the digits of a pair far from the lab's origin, and gives every rank the same bits.
+#pragma once
+
+#include "contact/contact.h"
+#include "geometry/support.h"
+
+namespace nurbs {
+
+struct PairFrame {
+  const Shape* a;
+  const Shape* b;
+  double scale_a, scale_b;
+  Mat3 axes_a;   // A's shape axes into the lab
+  Mat3 turn;     // B's shape axes into A's
+  Vec3 offset;   // B's centre of mass
+  double size;   // smaller bounding radius of the two, the scale of `tolerance`
+  double reach;  // larger of them, the scale of round-off
+
+  PairFrame(const Particle& pa, const Particle& pb)
+      : a(pa.shape), b(pb.shape), scale_a(pa.scale), scale_b(pb.scale), axes_a(pa.q.toRotationMatrix()) {
+    turn.noalias() = axes_a.transpose() * pb.q.toRotationMatrix();
+    offset.noalias() = axes_a.transpose() * (pb.x - pa.x);
+    const double ra = scale_a * a->bounding_radius, rb = scale_b * b->bounding_radius;
+    size = ra < rb ? ra : rb;
+    reach = ra < rb ? rb : ra;
+  }
+
+  Vec3 place_a(const Vec3& s) const { return scale_a * s; }
+  Vec3 place_b(const Vec3& s) const { return offset + scale_b * (turn * s); }
+  Vec3 direction_on_b(const Vec3& d) const {
+    return turn.transpose() * -d;
+  }  // the direction B's support is asked for
+};
+
+// A pair of surface points with their outward unit normals, in the pair frame.
+struct PointPair {
+  SurfacePoint on_a, on_b;
+  Vec3 a, b;    // positions
+  Vec3 na, nb;  // outward unit normals; na is about -nb at a contact
+};
+
+}  // namespace nurbs

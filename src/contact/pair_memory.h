@@ -1,0 +1,72 @@
+// What a pair remembers between steps, and the one place that says how. Plain doubles, so that it lives in
+// the host's contact history: it migrates, survives reneighbouring and restarts with the pair.
+#pragma once
+
+#include <cmath>
+#include <cstring>
+#include <limits>
+
+#include "contact/local_model.h"
+#include "contact/pair_search.h"
+
+namespace nurbs {
+
+struct PairMemory {
+  double known;  // 0 empty; 1 the reference pose and `lower` are set; 2 the surface points too; 3 the local
+                 // model too
+  // Reference pose: where the bodies were when `lower` was proven.
+  double offset[3];  // x_B - x_A, lab
+  double q_a[4];     // orientations, w x y z
+  double q_b[4];
+  double direction[3];  // unit d, lab, along which ...
+  double lower;         // ... the gap was proven at least this large
+  // Surface points of the last solve, the warm start.
+  double patch_a, u_a, v_a;
+  double patch_b, u_b, v_b;
+  // Local quadratic model at the reference pose, and the overlap below which its contact is the only one.
+  LocalModel model;
+  double unique;
+  double spare;
+};
+static_assert(sizeof(PairMemory) == kPairMemorySize * sizeof(double),
+              "the host allots kPairMemorySize doubles");
+
+// The host's doubles seen as a pair's memory, in place: copying them would cost more than the cheapest rung.
+inline PairMemory& memory_at(double* doubles) {
+  return *reinterpret_cast<PairMemory*>(doubles);
+}
+
+inline void store(const Vec3& v, double* to) {
+  std::memcpy(to, v.data(), 3 * sizeof(double));
+}
+inline Vec3 load(const double* from) {
+  return {from[0], from[1], from[2]};
+}
+inline void store(const Quat& q, double* to) {
+  to[0] = q.w();
+  to[1] = q.x();
+  to[2] = q.y();
+  to[3] = q.z();
+}
+
+// |q - q0| of unit quaternions is 2 sin(angle / 4); a point at distance R from the centre has moved by
+// 2 R sin(angle / 2) <= 2 R |q - q0|.
+inline double turned(const Quat& q, const double* q0) {
+  const double w = q.w() - q0[0], x = q.x() - q0[1], y = q.y() - q0[2], z = q.z() - q0[3];
+  return 2 * std::sqrt(w * w + x * x + y * y + z * z);
+}
+
+inline bool finite(const Particle& p) {
+  return p.x.allFinite() && p.q.coeffs().allFinite() && std::isfinite(p.scale) && p.scale > 0;
+}
+
+inline ContactResult separated(double lower, Rung rung) {
+  ContactResult r;
+  r.status = Status::separated;
+  r.rung = rung;
+  r.gap = r.lower = lower;
+  r.upper = std::numeric_limits<double>::infinity();
+  return r;
+}
+
+}  // namespace nurbs

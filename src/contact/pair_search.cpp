@@ -1,0 +1,285 @@
+// The ladder: each rung answers or hands the pair on to the next, dearer one.
+#include "contact/pair_search.h"
+
+#include <cmath>
+
+#include "contact/cso.h"
+#include "contact/direction_search.h"
+#include "contact/joint_newton.h"
+#include "contact/pair_frame.h"
+#include "contact/pair_memory.h"
+#include "contact/polytope.h"
+
+namespace nurbs {
+namespace {
+
+class Ladder {
+ public:
+  Ladder(const Particle& a, const Particle& b, const ContactSettings& settings, PairMemory& memory)
+      : a_(a), b_(b), settings_(settings), memory_(memory) {}
+
+  // Rung 1, no surface evaluation: spheres, then the budget of the last proof. Let d be the fixed lab
+  // direction along which the gap was proven at least `lower` at the reference pose: lower <= d.offset0 -
+  // h_A(d) - h_B(-d). Since then the offset has changed by an exactly known vector; no point of K has moved
+  // relative to its centre by more than 2 R_K |q_K - q0_K|, so neither has its support. Hence
+  //     gap >= lower + d . (offset - offset0) - 2 R_A |q_A - q0_A| - 2 R_B |q_B - q0_B|.
+  // Nothing is assumed of how the bodies moved in between.
+  double safe_gap() const {
+    const double ra = a_.scale * a_.shape->bounding_radius, rb = b_.scale * b_.shape->bounding_radius;
+    const Vec3 offset = b_.x - a_.x;
+    const double spheres2 = offset.squaredNorm(), reach = ra + rb;
+    double gap = spheres2 > reach * reach ? std::sqrt(spheres2) - reach : -reach;
+    if (memory_.known > 0) {
+      const double moved = load(memory_.direction).dot(offset - load(memory_.offset));
+      gap = std::max(gap,
+                     memory_.lower + moved - ra * turned(a_.q, memory_.q_a) - rb * turned(b_.q, memory_.q_b));
+    }
+    return gap * (1 - 4 * kRoundoff);
+  }
+
+  ContactResult run() {
+    const double safe = safe_gap();
+    if (safe > settings_.reach) return separated(safe, Rung::safe);
+    if (!finite(a_) || !finite(b_)) return {};
+    if (memory_.known >= 3) {
+      const double size =
+          std::min(a_.scale * a_.shape->bounding_radius, b_.scale * b_.shape->bounding_radius);
+      if (ContactResult r; local(settings_.tolerance * size, &r)) return r;
+    }
+    const PairFrame pair(a_, b_);
+    if (std::isfinite(settings_.reach)) {
+      // Rung 2: the atlases along the last separating direction, and along the line of centres.
+      Vec3 d = memory_.known > 0 ? Vec3(pair.axes_a.transpose() * load(memory_.direction))
+                                 : pair.offset.normalized();
+      const double lower = -atlas_overlap(pair, d);
+      if (lower > settings_.reach) {
+        remember_pose(pair, d, lower);
+        return separated(lower, Rung::bounds);
+      }
+    }
+    return solve(pair);
+  }
+
+ private:
+  // Rung 3: the quadratic model of the last solve, while its remainder is below half the tolerance, the
+  // contact stays on its patches and shallow enough to be the only one. The model is not renewed: nothing
+  // accumulates.
+  bool local(double tolerance, ContactResult* r) const {
+    const Vec3 offset = b_.x - a_.x;
+    const LocalContact c =
+        evaluate_local(memory_.model, turn_since(a_.q, memory_.q_a), turn_since(b_.q, memory_.q_b), offset);
+    if (!c.valid || -c.gap > memory_.unique) return false;
+    if (!(c.error <= 0.5 * tolerance && c.drift <= kLocalDrift * tolerance)) return false;
+    const double error = c.error + kRoundoff * offset.norm();
+    r->rung = Rung::local_model;
+    r->gap = c.gap;
+    r->lower = c.gap - error;
+    r->upper = c.gap + error;
+    r->normal = c.normal;
+    r->point_a = c.point_a;
+    r->point_b = c.point_b;
+    r->status = r->lower > settings_.reach ? Status::separated : Status::converged;
+    return true;
+  }
+
+  ContactResult solve(const PairFrame& pair) {
+    const double tolerance = std::max(settings_.tolerance * pair.size, kLeastTolerance * pair.reach);
+    int spent = 0;
+    if (memory_.known >= 2) {
+      const double angle_a = turned(a_.q, memory_.q_a), angle_b = turned(b_.q, memory_.q_b);
+      JointSolution warm = solve_joint(pair, warm_point(memory_.patch_a, memory_.u_a, memory_.v_a, *pair.a),
+                                       warm_point(memory_.patch_b, memory_.u_b, memory_.v_b, *pair.b),
+                                       tolerance, settings_.reach, kWarmIterations);
+      spent += warm.iterations;
+      if (warm.converged || confirm(pair, tolerance, warm)) {
+        const ContactResult r = finish(pair, warm, Rung::warm, spent);
+        if (r.status == Status::converged) remember_model(pair, warm, tolerance, angle_a, angle_b);
+        return r;
+      }
+    }
+    return cold(pair, tolerance, spent);
+  }
+
+  // A common normal of bodies with dents is certified by the hulls' supports along it.
+  bool confirm(const PairFrame& pair, double tolerance, JointSolution& s) const {
+    const double excess = pair.scale_a * pair.a->support_excess + pair.scale_b * pair.b->support_excess;
+    if (!s.stationary || excess <= 0.1 * tolerance || s.bracket.width() > 2 * excess + tolerance)
+      return false;
+    const Support a = find_hull_support(*pair.a, s.normal, &s.points.on_a);
+    const Support b = find_hull_support(*pair.b, pair.direction_on_b(s.normal), &s.points.on_b);
+    const double p = pair.scale_a * a.upper + pair.scale_b * b.upper - s.normal.dot(pair.offset);
+    if (-p > s.bracket.lower) {
+      s.bracket.lower = -p;
+      s.bracket.direction = s.normal;
+    }
+    s.converged = s.bracket.width() <= tolerance;
+    if (s.converged) s.gap = std::clamp(s.gap, s.bracket.lower, s.bracket.upper);
+    return s.converged;
+  }
+
+  // Newton from the supports along a guessed direction, certified or not.
+  JointSolution polish(const PairFrame& pair, const DirectionGuess& guess, double tolerance) const {
+    const Support a = find_hull_support(*pair.a, guess.d);
+    const Support b = find_hull_support(*pair.b, pair.direction_on_b(guess.d));
+    JointSolution joint = solve_joint(pair, a.where, b.where, tolerance, settings_.reach, kPolishIterations);
+    if (!joint.converged) confirm(pair, tolerance, joint);
+    ++joint.iterations;
+    return joint;
+  }
+
+  // The line of centres leads to most contacts, and the certificate says when it did not: then the basins of
+  // a scan over all directions, the lowest first.
+  ContactResult cold(const PairFrame& pair, double tolerance, int spent) {
+    DirectionGuess guesses[kColdGuesses + 1];
+    int found = guess_from_centres(pair, guesses), tried = 0;
+    JointSolution best;
+    bool have = false;
+    for (bool scanned = false;;) {
+      for (; tried < found; ++tried) {
+        const JointSolution joint = polish(pair, refine_guess(pair, guesses[tried]), tolerance);
+        spent += joint.iterations;
+        if (joint.converged) return finish(pair, joint, Rung::cold, spent);
+        if (!joint.stationary || (have && joint.gap <= best.gap)) continue;
+        best = joint;
+        have = true;
+      }
+      if (scanned) break;
+      found += guess_directions(pair, guesses + found, kColdGuesses);
+      scanned = true;
+    }
+    const auto lowest = std::min_element(
+        guesses, guesses + found, [](const DirectionGuess& x, const DirectionGuess& y) { return x.p < y.p; });
+    return fallback(pair, have ? &best : nullptr, lowest->d, tolerance, spent);
+  }
+
+  // The polytope brackets the global answer; a stationary point that lies inside its bracket is a better
+  // estimate of points and normal than the polytope's own.
+  ContactResult fallback(const PairFrame& pair, const JointSolution* known, const Vec3& seed,
+                         double tolerance, int spent) {
+    PolytopeResult hull = solve_polytope(pair, known ? known->normal : seed, tolerance, settings_.reach);
+    spent += hull.iterations;
+    JointSolution joint;
+    bool polished = false;
+    if (known && known->gap <= hull.bracket.upper && known->gap >= hull.bracket.lower - tolerance) {
+      joint = *known;
+      polished = true;
+    } else {
+      joint = solve_joint(pair, hull.points.on_a, hull.points.on_b, tolerance, settings_.reach,
+                          kPolishIterations);
+      spent += joint.iterations;
+      if (joint.converged) return finish(pair, joint, Rung::fallback, spent);
+      polished =
+          joint.stationary && joint.gap <= hull.bracket.upper && joint.gap >= hull.bracket.lower - tolerance;
+    }
+    if (polished) {
+      hull.points = joint.points;
+      hull.bracket.direction = joint.normal;
+      hull.bracket.lower = std::max(hull.bracket.lower, joint.bracket.lower);
+      hull.gap = std::clamp(joint.gap, hull.bracket.lower, hull.bracket.upper);
+    }
+    hull.converged = hull.bracket.width() <= tolerance;
+    return finish(pair, hull, Rung::fallback, spent);
+  }
+
+  template <class Solution>
+  static Vec3 normal_of(const Solution& s) {
+    if constexpr (std::is_same_v<Solution, JointSolution>)
+      return s.normal;
+    else
+      return s.bracket.direction;
+  }
+
+  template <class Solution>
+  ContactResult finish(const PairFrame& pair, const Solution& s, Rung rung, int iterations) {
+    remember_pose(pair, s.bracket.direction, s.bracket.lower);
+    remember_points(s.points);
+    ContactResult r;
+    r.rung = rung;
+    r.iterations = iterations;
+    r.lower = s.bracket.lower;
+    r.upper = s.bracket.upper;
+    r.gap = s.gap;
+    r.normal = pair.axes_a * normal_of(s);
+    r.point_a = pair.axes_a * s.points.a;
+    r.point_b = pair.axes_a * s.points.b;
+    if (s.converged)
+      r.status = r.lower > settings_.reach ? Status::separated : Status::converged;
+    else
+      r.status = r.lower > settings_.reach ? Status::separated : Status::unresolved;
+    if (r.status == Status::separated) r.gap = r.lower;
+    return r;
+  }
+
+  static SurfacePoint warm_point(double patch, double u, double v, const Shape& shape) {
+    const int p = static_cast<int>(patch);
+    if (p < 0 || p >= static_cast<int>(shape.patches.size())) return {};
+    return {p, u, v};
+  }
+
+  void remember_pose(const PairFrame& pair, const Vec3& d, double lower) {
+    memory_.known = std::clamp(memory_.known, 1.0, 2.0);  // a model belongs to the old reference
+    store(b_.x - a_.x, memory_.offset);
+    store(a_.q, memory_.q_a);
+    store(b_.q, memory_.q_b);
+    store(Vec3(pair.axes_a * d), memory_.direction);
+    memory_.lower = lower;
+  }
+
+  void remember_points(const PointPair& p) {
+    memory_.known = 2;  // drops the model
+    memory_.patch_a = p.on_a.patch;
+    memory_.u_a = p.on_a.u;
+    memory_.v_a = p.on_a.v;
+    memory_.patch_b = p.on_b.patch;
+    memory_.u_b = p.on_b.u;
+    memory_.v_b = p.on_b.v;
+  }
+
+  // Worth its 50 ns only if bodies that turn as they just did would be served at least once.
+  void remember_model(const PairFrame& pair, const JointSolution& s, double tolerance, double angle_a,
+                      double angle_b) {
+    const double rate_a = pair.scale_a * pair.a->curvature_rate[s.base_a.patch];
+    const double rate_b = pair.scale_b * pair.b->curvature_rate[s.base_b.patch];
+    const double third = rate_a * angle_a * angle_a * angle_a + rate_b * angle_b * angle_b * angle_b;
+    if (!(kRemainderSafety * third / 6 <= 0.5 * tolerance)) return;
+    if (!make_support_model(pair.axes_a, Vec3::Zero(), s.base_a, s.jet_a, rate_a, &memory_.model.a)) return;
+    if (!make_support_model(pair.axes_a, pair.offset, s.base_b, s.jet_b, rate_b, &memory_.model.b)) return;
+    memory_.unique = 0.5 * s.bracket.unique;
+    memory_.known = 3;
+  }
+
+  const Particle &a_, &b_;
+  const ContactSettings& settings_;
+  PairMemory& memory_;
+};
+
+ContactResult reference_solver(const Particle& a, const Particle& b, const ContactSettings& settings,
+                               PairMemory& memory) {
+  if (!finite(a) || !finite(b)) return {};
+  CsoStart start;
+  start.valid = memory.known >= 2;
+  start.direction = load(memory.direction);
+  start.on_a = {static_cast<int>(memory.patch_a), memory.u_a, memory.v_a};
+  start.on_b = {static_cast<int>(memory.patch_b), memory.u_b, memory.v_b};
+  const ContactResult r = solve_cso(a, b, settings.tolerance, &start);
+  memory.known = start.valid ? 2 : 0;
+  store(start.direction, memory.direction);
+  memory.patch_a = start.on_a.patch;
+  memory.u_a = start.on_a.u;
+  memory.v_a = start.on_a.v;
+  memory.patch_b = start.on_b.patch;
+  memory.u_b = start.on_b.u;
+  memory.v_b = start.on_b.v;
+  return r;
+}
+
+}  // namespace
+
+ContactResult find_contact(const Particle& a, const Particle& b, const ContactSettings& settings,
+                           double* memory) {
+  PairMemory& m = memory_at(memory);
+  return settings.solver == Solver::cso ? reference_solver(a, b, settings, m)
+                                        : Ladder(a, b, settings, m).run();
+}
+
+}  // namespace nurbs

@@ -1,0 +1,22 @@
+// The ladder for one neighbour pair, cheapest rung first, and the memory it keeps between steps.
+#pragma once
+
+#include "contact/contact.h"
+
+namespace nurbs {
+
+// Everything a pair remembers, as plain doubles so that it can live in the host's contact history. All zeros
+// is an empty memory. The layout is private to the ladder (pair_memory.h).
+constexpr int kPairMemorySize = 52;
+
+// Gap, normal and contact points of two particles. Neither throws nor allocates; always returns a bracket.
+// Deterministic: the result depends only on the arguments, and callers pass the particles in tag order.
+ContactResult find_contact(const Particle& a, const Particle& b, const ContactSettings& settings,
+                           double* memory);
+
+// The same for a plane through `origin` with unit `normal` (pointing to the particle's side). A is the plane,
+// so result.normal equals `normal`; both points are relative to the PARTICLE's centre of mass here.
+ContactResult find_plane_contact(const Particle& particle, const Vec3& origin, const Vec3& normal,
+                                 const ContactSettings& settings, double* memory);
+
+}  // namespace nurbs

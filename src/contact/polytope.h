@@ -1,0 +1,28 @@
+// The polytope method: the fallback that needs nothing but support mappings, so it works on flats, creases,
+// corners and vanishing curvature, and brackets the global minimum of p(d) whatever the overlap.
+#pragma once
+
+#include "contact/certificate.h"
+#include "contact/pair_frame.h"
+
+namespace nurbs {
+
+struct PolytopeResult {
+  PointPair points;  // witness points; normals are set to the search direction
+  Bracket bracket;   // certified, of the gap, over ALL directions
+  double gap;        // direction . (b - a), inside the bracket
+  int iterations;    // support pairs evaluated
+  bool converged;    // bracket no wider than the tolerance
+};
+
+// Grows a polytope inside the configuration space obstacle A - B (shrunk by a share of the bodies' least
+// curvature radii, which are added back) from exact support points. While the origin is outside, the next
+// direction is that of the polytope's nearest point, as in GJK, and |nearest point| bounds the gap above;
+// once inside, the normal of the nearest face, as in EPA, and its distance bounds the overlap below. Every
+// support gives the opposite bound p(d). Source: Gilbert, Johnson & Keerthi 1988; van den Bergen 2003, ch. 4,
+// here on one growing hull for both phases, on exact surfaces and with rigorous bounds. `seed`: a direction
+// worth trying first, or zero. Stops within `tolerance` (a length), when the gap is proven larger than
+// `enough`, or at its caps. Works in fixed-size storage.
+PolytopeResult solve_polytope(const PairFrame& pair, const Vec3& seed, double tolerance, double enough);
+
+}  // namespace nurbs
