@@ -1,0 +1,40 @@
+// Errors and warnings of the NURBS styles. See host_error.h.
+#include "host/host_error.h"
+
+#include <mpi.h>
+
+#include <cstdio>
+#include <cstdlib>
+
+#include "comm.h"
+#include "error.h"
+#include "lammps.h"
+
+namespace LAMMPS_NS::nurbs_host {
+
+void fail_all(const char* file, int line, LAMMPS* lmp, const std::string& message) {
+  lmp->error->all(file, line, message.c_str());
+  std::exit(1);  // not reached: error->all ends the program
+}
+
+void fail_one(LAMMPS* lmp, const std::string& message) {
+  for (FILE* stream : {lmp->screen, lmp->logfile}) {
+    if (stream == nullptr) continue;
+    std::fprintf(stream, "ERROR: %s\n", message.c_str());
+    std::fflush(stream);
+  }
+  MPI_Abort(lmp->world, 1);
+  std::exit(1);
+}
+
+void warn(const char* file, int line, LAMMPS* lmp, const std::string& message) {
+  if (lmp->comm->me == 0) lmp->error->warning(file, line, message.c_str());
+}
+
+std::string show(double value) {
+  char text[32];
+  std::snprintf(text, sizeof text, "%.10g", value);
+  return text;
+}
+
+}  // namespace LAMMPS_NS::nurbs_host
