@@ -1,0 +1,197 @@
+#!/usr/bin/python3
+"""Draws the particles at the times of the paper's Fig. 3 from the files of dump nurbs/vtk.
+
+Usage: render.py [FOLDER]     reads FOLDER/figure-*.vtu, writes FOLDER/scene.png
+"""
+
+import os
+import pathlib
+import sys
+
+if not os.environ.get("DISPLAY"):  # Debian's VTK draws through X; a virtual screen will do
+    os.execvp("xvfb-run", ["xvfb-run", "-a", "-s", "-screen 0 1600x1200x24", sys.executable, *sys.argv])
+
+import matplotlib
+import numpy as np
+import vtk
+from vtk.util.numpy_support import numpy_to_vtk, vtk_to_numpy
+
+matplotlib.use("Agg")
+import matplotlib.pyplot as plt
+
+from nurbs_vtu import read_grid, read_patches, read_time
+
+TIMES = (0, 0.065, 0.07963, 0.21769)
+COLORS = {1: (0.84, 0.49, 0.26), 2: (0.33, 0.53, 0.72)}
+FLOOR = 0.2
+SIZE = (900, 900)
+
+
+def surface_of(patches, samples=40):
+    """The patches as one mesh of triangles with exact normals, coloured by body."""
+    t = np.linspace(0, 1, samples)
+    points, normals, colors, quads = [], [], [], []
+    grid = np.arange(samples * samples).reshape(samples, samples)
+    corners = np.stack([grid[:-1, :-1], grid[1:, :-1], grid[1:, 1:], grid[:-1, 1:]], axis=-1).reshape(-1, 4)
+    for k, patch in enumerate(patches):
+        x, n = patch.evaluate(t, t)
+        points.append(x.reshape(-1, 3))
+        normals.append(n.reshape(-1, 3))
+        color = np.array(COLORS[(int(patch.data["id"][0]) - 1) % len(COLORS) + 1])
+        colors.append(np.tile(color * 255, (samples**2, 1)))
+        quads.append(corners + k * samples**2)
+    return mesh(np.vstack(points), np.vstack(quads), np.vstack(normals), np.vstack(colors))
+
+
+def mesh(points, faces, normals, colors):
+    data = vtk.vtkPolyData()
+    data.SetPoints(vtk.vtkPoints())
+    data.GetPoints().SetData(numpy_to_vtk(points, deep=True))
+    cells = vtk.vtkCellArray()
+    rows = np.hstack([np.full((len(faces), 1), faces.shape[1]), faces]).ravel()
+    cells.ImportLegacyFormat(numpy_to_vtk(rows, deep=True, array_type=vtk.VTK_ID_TYPE))
+    data.SetPolys(cells)
+    data.GetPointData().SetNormals(numpy_to_vtk(normals, deep=True))
+    data.GetPointData().SetScalars(numpy_to_vtk(colors.astype(np.uint8), deep=True))
+    return data
+
+
+def seams_of(patches, samples=60, lift=1.5e-5):
+    """The patch boundaries as lines just above the surface."""
+    t, ends = np.linspace(0, 1, samples), np.array([0.0, 1.0])
+    append = vtk.vtkAppendPolyData()
+    for patch in patches:
+        along_v, along_u = patch.evaluate(ends, t), patch.evaluate(t, ends)
+        for x, n in ((along_v[0], along_v[1]), (along_u[0].swapaxes(0, 1), along_u[1].swapaxes(0, 1))):
+            for side in range(2):
+                line = vtk.vtkPolyLineSource()
+                line.SetNumberOfPoints(samples)
+                for k, point in enumerate(x[side] + lift * n[side]):
+                    line.SetPoint(k, *point)
+                append.AddInputConnection(line.GetOutputPort())
+    tube = vtk.vtkTubeFilter()
+    tube.SetInputConnection(append.GetOutputPort())
+    tube.SetRadius(1.6e-4)
+    tube.SetNumberOfSides(8)
+    tube.Update()
+    return tube.GetOutput()
+
+
+def floor_around(center, size=2.4):
+    plane = vtk.vtkPlaneSource()
+    x, y = center[0] - size / 2, center[1] - size / 2
+    plane.SetOrigin(x, y, FLOOR)
+    plane.SetPoint1(x + size, y, FLOOR)
+    plane.SetPoint2(x, y + size, FLOOR)
+    plane.SetResolution(100, 100)
+    plane.Update()
+    return plane.GetOutput()
+
+
+def actor(data, color=None, specular=0.0, ambient=0.1):
+    mapper = vtk.vtkPolyDataMapper()
+    mapper.SetInputData(data)
+    mapper.SetScalarVisibility(color is None)
+    shown = vtk.vtkActor()
+    shown.SetMapper(mapper)
+    look = shown.GetProperty()
+    look.SetInterpolationToPhong()
+    look.SetAmbient(ambient)
+    look.SetDiffuse(0.85)
+    look.SetSpecular(specular)
+    look.SetSpecularPower(35)
+    if color is not None:
+        look.SetColor(*color)
+    return shown
+
+
+def spot(position, focus, intensity, cone=40):
+    """A lamp that casts shadows."""
+    lamp = vtk.vtkLight()
+    lamp.SetPosition(*position)
+    lamp.SetFocalPoint(*focus)
+    lamp.SetPositional(True)
+    lamp.SetConeAngle(cone)
+    lamp.SetIntensity(intensity)
+    return lamp
+
+
+def fill(direction, intensity):
+    """Light from far away, without shadows."""
+    lamp = vtk.vtkLight()
+    lamp.SetPosition(*direction)
+    lamp.SetFocalPoint(0, 0, 0)
+    lamp.SetIntensity(intensity)
+    return lamp
+
+
+def shadow_pass():
+    shadows = vtk.vtkShadowMapPass()
+    shadows.GetShadowMapBakerPass().SetResolution(2048)
+    order = vtk.vtkRenderPassCollection()
+    for step in (shadows.GetShadowMapBakerPass(), shadows):
+        order.AddItem(step)
+    sequence = vtk.vtkSequencePass()
+    sequence.SetPasses(order)
+    camera_pass = vtk.vtkCameraPass()
+    camera_pass.SetDelegatePass(sequence)
+    return camera_pass
+
+
+def picture(patches, focus):
+    """The scene as an image array, seen from the front and above."""
+    focus = np.array(focus)
+    renderer = vtk.vtkRenderer()
+    renderer.SetBackground(1, 1, 1)
+    renderer.SetAutomaticLightCreation(False)
+    renderer.AddActor(actor(surface_of(patches), specular=0.3, ambient=0.2))
+    renderer.AddActor(actor(seams_of(patches), color=(0.15, 0.15, 0.17), ambient=0.3))
+    renderer.AddActor(actor(floor_around(focus), color=(0.96, 0.96, 0.95), ambient=0.42))
+    renderer.AddLight(spot(focus + (0.35, -0.5, 1.1), focus, 0.6))
+    renderer.AddLight(spot(focus + (-0.7, -0.6, 0.9), focus, 0.22))
+    renderer.AddLight(fill((-0.3, -1, -0.35), 0.2))
+    renderer.SetPass(shadow_pass())
+    camera = renderer.GetActiveCamera()
+    camera.SetPosition(*(focus + (0.13, -0.5, 0.24)))
+    camera.SetFocalPoint(*focus)
+    camera.SetViewUp(0, 0, 1)
+    camera.SetViewAngle(26)
+    renderer.ResetCameraClippingRange()
+    return grab(renderer)
+
+
+def grab(renderer):
+    window = vtk.vtkRenderWindow()
+    window.SetOffScreenRendering(True)
+    window.SetMultiSamples(0)
+    window.SetSize(*SIZE)
+    window.AddRenderer(renderer)
+    window.Render()
+    image = vtk.vtkWindowToImageFilter()
+    image.SetInput(window)
+    image.ReadFrontBufferOff()
+    image.Update()
+    output = image.GetOutput()
+    width, height, _ = output.GetDimensions()
+    return vtk_to_numpy(output.GetPointData().GetScalars()).reshape(height, width, -1)[::-1]
+
+
+def snapshot_at(grids, time):
+    return min(grids, key=lambda grid: abs(read_time(grid) - time))
+
+
+def main():
+    folder = pathlib.Path(sys.argv[1] if len(sys.argv) > 1 else ".")
+    grids = [read_grid(file) for file in sorted(folder.glob("figure-*.vtu"))]
+    figure, panels = plt.subplots(1, len(TIMES), figsize=(4 * len(TIMES), 4.2))
+    for panel, time in zip(panels, TIMES):
+        grid = snapshot_at(grids, time)
+        panel.imshow(picture(read_patches(grid), (0.009, 0.007, 0.275)))
+        panel.set_title(f"t = {read_time(grid):.5g} s", fontsize=13)
+        panel.axis("off")
+    figure.subplots_adjust(left=0, right=1, bottom=0, top=0.93, wspace=0.01)
+    figure.savefig(folder / "scene.png", dpi=110)
+
+
+if __name__ == "__main__":
+    main()
