@@ -1,0 +1,142 @@
+// Volume, centre of mass and inertia against closed forms, in random poses.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <random>
+
+#include "geometry/mass_properties.h"
+#include "geometry/primitives.h"
+
+namespace nurbs {
+namespace {
+
+using Random = std::mt19937_64;
+
+double uniform(Random& random, double lo, double hi) {
+  return std::uniform_real_distribution<double>(lo, hi)(random);
+}
+
+Quat random_rotation(Random& random) {
+  std::normal_distribution<double> normal;
+  return Quat(normal(random), normal(random), normal(random), normal(random)).normalized();
+}
+
+std::vector<BezierPatch> split_all(const std::vector<NurbsSurface>& surfaces) {
+  std::vector<BezierPatch> patches;
+  for (const NurbsSurface& s : surfaces) {
+    for (BezierPiece& piece : split_to_bezier(s)) patches.push_back(piece.patch);
+  }
+  return patches;
+}
+
+void move(std::vector<BezierPatch>& patches, const Mat3& rotation, const Vec3& offset) {
+  for (BezierPatch& patch : patches) {
+    for (Vec4& p : patch.points) p.head<3>() = (rotation * p.head<3>() + p[3] * offset).eval();
+  }
+}
+
+// Second moments of the unit solid (x x^T integrated), from which inertia follows.
+Mat3 inertia_of(const Mat3& second) {
+  return second.trace() * Mat3::Identity() - second;
+}
+
+struct Expected {
+  double volume;
+  Vec3 second;  // about the centre, along the body's axes
+};
+
+Expected ellipsoid(const Vec3& a) {
+  const double volume = 4 * M_PI / 3 * a.prod();
+  return {volume, volume / 5 * a.cwiseProduct(a)};
+}
+
+Expected cuboid(const Vec3& half) {
+  const double volume = 8 * half.prod();
+  return {volume, volume / 3 * half.cwiseProduct(half)};
+}
+
+void expect_mass(const std::vector<NurbsSurface>& body, const Expected& expected, Random& random,
+                 double tolerance) {
+  std::vector<BezierPatch> patches = split_all(body);
+  const Mat3 r = random_rotation(random).toRotationMatrix();
+  const double size = std::cbrt(expected.volume);
+  const Vec3 offset = size * Vec3(uniform(random, -3, 3), uniform(random, -3, 3), uniform(random, -3, 3));
+  move(patches, r, offset);
+  const MassProperties mass = integrate_mass(patches);
+  const Mat3 inertia = r * inertia_of(expected.second.asDiagonal()) * r.transpose();
+  EXPECT_NEAR(mass.volume / expected.volume, 1, tolerance);
+  EXPECT_LT((mass.center - offset).norm(), tolerance * size);
+  EXPECT_LT((mass.inertia - inertia).norm(), tolerance * inertia.norm());
+}
+
+TEST(MassProperties, ExactEllipsoids) {
+  Random random(1);
+  for (int trial = 0; trial < 20; ++trial) {
+    const Vec3 a(uniform(random, 0.3, 3), uniform(random, 0.3, 3), uniform(random, 0.3, 3));
+    expect_mass(exact_ellipsoid(a), ellipsoid(a), random, 1e-10);
+  }
+}
+
+TEST(MassProperties, OnePatchEllipsoidsWithPolesAndSeam) {
+  Random random(2);
+  for (int trial = 0; trial < 20; ++trial) {
+    const double a = uniform(random, 0.3, 3), c = uniform(random, 0.3, 3);
+    expect_mass(revolved_ellipsoid(a, c), ellipsoid({a, a, c}), random, 1e-10);
+  }
+}
+
+TEST(MassProperties, ThinDiscAndNeedle) {
+  Random random(3);
+  for (const Vec3& a : {Vec3(1, 1, 1e-3), Vec3(1, 1e-3, 1e-3)}) {
+    expect_mass(exact_ellipsoid(a), ellipsoid(a), random, 1e-10);
+  }
+}
+
+TEST(MassProperties, SmallAndLargeUnits) {
+  Random random(4);
+  for (double unit : {1e-6, 1e3}) {
+    const Vec3 a = unit * Vec3(1, 2, 1.5);
+    expect_mass(exact_ellipsoid(a), ellipsoid(a), random, 1e-10);
+  }
+}
+
+TEST(MassProperties, BoxIsIntegratedToRoundOff) {
+  Random random(5);
+  for (int trial = 0; trial < 20; ++trial) {
+    const Vec3 half(uniform(random, 0.3, 3), uniform(random, 0.3, 3), uniform(random, 0.3, 3));
+    expect_mass(box(half), cuboid(half), random, 2e-13);
+  }
+}
+
+TEST(MassProperties, InwardPatchesGiveNegativeVolume) {
+  std::vector<NurbsSurface> body = exact_ellipsoid({1, 2, 3});
+  const double volume = integrate_mass(split_all(body)).volume;
+  for (NurbsSurface& s : body) s = swap_uv(s);
+  EXPECT_NEAR(integrate_mass(split_all(body)).volume, -volume, 1e-12 * volume);
+}
+
+TEST(PrincipalFrame, DiagonalisesARotatedTensor) {
+  Random random(6);
+  for (int trial = 0; trial < 100; ++trial) {
+    Vec3 moments(uniform(random, 1, 2), uniform(random, 1, 2), uniform(random, 1, 2));
+    std::sort(moments.data(), moments.data() + 3);
+    const Mat3 r = random_rotation(random).toRotationMatrix();
+    const Mat3 tensor = r * moments.asDiagonal() * r.transpose();
+    const PrincipalFrame frame = principal_frame(tensor);
+    EXPECT_LT((frame.moments - moments).norm(), 1e-14);
+    const Mat3 axes = frame.axes.toRotationMatrix();
+    EXPECT_NEAR(axes.determinant(), 1, 1e-14);
+    EXPECT_LT((axes * moments.asDiagonal() * axes.transpose() - tensor).norm(), 1e-14);
+  }
+}
+
+TEST(PrincipalFrame, DiagonalTensorKeepsItsAxes) {
+  Mat3 tensor = Vec3(1, 2, 3).asDiagonal();
+  tensor(0, 1) = tensor(1, 0) = 1e-17;
+  EXPECT_LT(principal_frame(tensor).axes.angularDistance(Quat::Identity()), 1e-15);
+  EXPECT_LT(principal_frame(Mat3::Identity()).axes.angularDistance(Quat::Identity()), 1e-15);
+}
+
+}  // namespace
+}  // namespace nurbs

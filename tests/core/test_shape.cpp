@@ -1,0 +1,522 @@
+// Shapes: joining, orientation, bounds, kinks, convexity, curvature, and every way a body can be refused.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <random>
+
+#include "geometry/connectivity.h"
+#include "geometry/primitives.h"
+#include "geometry/shape.h"
+
+namespace nurbs {
+namespace {
+
+using Random = std::mt19937_64;
+using Surfaces = std::vector<NurbsSurface>;
+
+double uniform(Random& random, double lo, double hi) {
+  return std::uniform_real_distribution<double>(lo, hi)(random);
+}
+
+Quat random_rotation(Random& random) {
+  std::normal_distribution<double> normal;
+  return Quat(normal(random), normal(random), normal(random), normal(random)).normalized();
+}
+
+void move(Surfaces& body, const Mat3& linear, const Vec3& offset) {
+  for (NurbsSurface& s : body) {
+    for (Vec4& p : s.points) p.head<3>() = (linear * p.head<3>() + p[3] * offset).eval();
+  }
+}
+
+NurbsSurface reverse_u(const NurbsSurface& s) {
+  NurbsSurface out = s;
+  std::reverse(out.knots_u.begin(), out.knots_u.end());
+  const double sum = s.knots_u.front() + s.knots_u.back();
+  for (double& k : out.knots_u) k = sum - k;
+  for (int i = 0; i < s.size_u; ++i) {
+    for (int j = 0; j < s.size_v; ++j) out.point(i, j) = s.point(s.size_u - 1 - i, j);
+  }
+  return out;
+}
+
+// One of the eight ways to lay (u, v) over the same patch. Odd ones turn its normal round.
+NurbsSurface relabel(NurbsSurface s, int way) {
+  if (way & 4) s = swap_uv(reverse_u(s));  // quarter turn
+  if (way & 2) s = swap_uv(reverse_u(swap_uv(reverse_u(s))));
+  if (way & 1) s = swap_uv(s);
+  return s;
+}
+
+std::shared_ptr<const Shape> build(Surfaces body, std::vector<std::string>* warnings = nullptr) {
+  return make_shape("body", std::move(body), std::nullopt, warnings);
+}
+
+std::string error_of(const Surfaces& body, const std::optional<Mat3>& gyration = std::nullopt) {
+  try {
+    make_shape("body", body, gyration);
+  } catch (const ShapeError& error) {
+    return error.what();
+  }
+  return "accepted";
+}
+
+bool contains(const std::string& text, const std::string& part) {
+  return text.find(part) != std::string::npos;
+}
+
+// Every link leads to an edge that leads back and lies on the same points, and every normal points outward.
+void expect_consistent(const Shape& shape, double tolerance = 1e-12) {
+  ASSERT_EQ(shape.links.size(), shape.patches.size());
+  for (size_t p = 0; p < shape.patches.size(); ++p) {
+    for (int e = 0; e < 4; ++e) {
+      const EdgeLink& link = shape.links[p][e];
+      if (link.collapsed) {
+        EXPECT_EQ(link.patch, -1);
+        continue;
+      }
+      ASSERT_GE(link.patch, 0);
+      const EdgeLink& back = shape.links[link.patch][link.edge];
+      EXPECT_EQ(back.patch, static_cast<int>(p));
+      EXPECT_EQ(back.edge, e);
+      EXPECT_EQ(back.reversed, link.reversed);
+      for (double t : {0.0, 0.3, 0.8}) {
+        const Vec2 a = edge_parameters(e, t), b = edge_parameters(link.edge, partner_parameter(link, t));
+        const Vec3 x = evaluate0(shape.patches[p], a[0], a[1]);
+        const Vec3 y = evaluate0(shape.patches[link.patch], b[0], b[1]);
+        EXPECT_LT((x - y).norm(), tolerance * shape.bounding_radius);
+      }
+    }
+    const Jet1 j = evaluate1(shape.patches[p], 0.4, 0.6);
+    EXPECT_GT(j.s.dot(j.su.cross(j.sv)), 0);
+  }
+}
+
+// Body of revolution about z from a Bezier meridian (r, z), as one patch with two poles and a seam.
+Surfaces revolve(const std::vector<Vec2>& meridian) {
+  constexpr int kCircle[9][2] = {{1, 0},   {1, 1},  {0, 1},  {-1, 1}, {-1, 0},
+                                 {-1, -1}, {0, -1}, {1, -1}, {1, 0}};
+  NurbsSurface s;
+  s.degree_u = 2;
+  s.degree_v = static_cast<int>(meridian.size()) - 1;
+  s.knots_u = {0, 0, 0, 0.25, 0.25, 0.5, 0.5, 0.75, 0.75, 1, 1, 1};
+  s.knots_v.assign(meridian.size(), 0);
+  s.knots_v.resize(2 * meridian.size(), 1);
+  s.size_u = 9;
+  s.size_v = static_cast<int>(meridian.size());
+  for (int i = 0; i < 9; ++i) {
+    const double w = i % 2 ? std::sqrt(0.5) : 1;
+    for (const Vec2& m : meridian) {
+      s.points.push_back(w * Vec4(m[0] * kCircle[i][0], m[0] * kCircle[i][1], m[1], 1));
+    }
+  }
+  return {s};
+}
+
+// Meridian with a waist: r(s) = 4 a s + (6 b - 8 a) s^2 with s = t (1 - t), so for b < 0 the waist s = 1/4
+// lies below the tangent line r = 4 a^2 / (8 a - 6 b) by `depth`.
+struct Waisted {
+  Surfaces body;
+  double depth;
+};
+Waisted waisted(double b) {
+  const double a = 1, c = 8 * a - 6 * b;
+  const double top = 4 * a * a / c, waist = a - c / 16;
+  return {revolve({{0, -1}, {a, -1}, {b, 0}, {a, 1}, {0, 1}}), top - waist};
+}
+
+// --- joining and orientation
+// -------------------------------------------------------------------------------------
+
+TEST(Connectivity, SixPatchesInEveryRandomLayout) {
+  Random random(1);
+  const Surfaces original = exact_ellipsoid({1, 1.5, 2});
+  const double volume = build(original)->mass.volume;
+  for (int trial = 0; trial < 20; ++trial) {
+    Surfaces body = original;
+    for (NurbsSurface& s : body) s = relabel(s, std::uniform_int_distribution<int>(0, 7)(random));
+    std::shuffle(body.begin(), body.end(), random);
+    move(body, random_rotation(random).toRotationMatrix(), Vec3(5, -3, 2));
+    std::vector<std::string> warnings;
+    const auto shape = build(body, &warnings);
+    expect_consistent(*shape);
+    EXPECT_NEAR(shape->mass.volume, volume, 1e-10 * volume);
+    EXPECT_TRUE(shape->smooth);
+    int turned = 0;
+    for (size_t i = 0; i < body.size(); ++i) turned += shape->surfaces[i].points != body[i].points;
+    EXPECT_EQ(warnings.size(), turned > 0 ? 1u : 0u);
+  }
+}
+
+TEST(Connectivity, BezierPiecesInsideASurfaceAreJoined) {
+  const auto shape = build(fitted_ellipsoid({1, 1.2, 0.8}, 3));
+  EXPECT_EQ(shape->patches.size(), 54u);
+  expect_consistent(*shape, 1e-9);
+}
+
+TEST(Connectivity, OnePatchBodyHasPolesAndASeam) {
+  const auto shape = build(revolved_ellipsoid(1, 2));
+  expect_consistent(*shape);
+  int poles = 0, seams = 0;
+  for (const auto& links : shape->links) {
+    for (const EdgeLink& link : links) poles += link.collapsed;
+  }
+  EXPECT_EQ(poles, 8);  // four quarters at each end
+  for (size_t p = 0; p < shape->patches.size(); ++p) {
+    seams += p < 2 && shape->links[p][0].patch == static_cast<int>(p) + 6;
+  }
+  EXPECT_EQ(seams, 2);
+  EXPECT_TRUE(shape->smooth);
+}
+
+TEST(Connectivity, SidesMayBeParametrisedDifferently) {
+  // Weights times powers of a constant: the same surface at u' = u / (u + c (1 - u)).
+  Surfaces body = exact_ellipsoid({1, 1.5, 2});
+  for (int i = 0; i < body[2].size_u; ++i) {
+    for (int j = 0; j < body[2].size_v; ++j) body[2].point(i, j) *= std::pow(1.7, i) * std::pow(0.6, j);
+  }
+  const auto shape = build(body);
+  EXPECT_TRUE(shape->smooth);
+  EXPECT_NEAR(shape->mass.volume, 4 * M_PI, 1e-9);
+  expect_consistent(*shape, 1);
+}
+
+TEST(Connectivity, SmallGapsAreAcceptedLargeOnesNamed) {
+  Surfaces body = exact_ellipsoid({1, 1, 1});
+  for (Vec4& p : body[3].points) p[0] += 1e-6 * p[3];
+  EXPECT_EQ(error_of(body), "accepted");
+  for (Vec4& p : body[3].points) p[0] += 1e-4 * p[3];
+  const std::string error = error_of(body);
+  EXPECT_TRUE(contains(error, "body: patch ") && contains(error, "has no partner: the surface is open"))
+      << error;
+  EXPECT_TRUE(contains(error, "0.000101 away (allowed ")) << error;
+}
+
+TEST(Connectivity, OpenSurfaceNamesPatchAndEdge) {
+  Surfaces body = box({1, 2, 3});
+  body.erase(body.begin() + 5);
+  const std::string error = error_of(body);
+  EXPECT_TRUE(contains(error, "edge u=") || contains(error, "edge v=")) << error;
+  EXPECT_TRUE(contains(error, "has no partner")) << error;
+  Surfaces half = revolve({{0, -1}, {1, -1}, {1, 0}});
+  EXPECT_TRUE(contains(error_of(half), "body: patch 0 edge v=1 (u=0..0.25) has no partner"))
+      << error_of(half);
+}
+
+TEST(Connectivity, EdgesSplitDifferentlyAreRefused) {
+  Surfaces body = box({1, 1, 1});
+  NurbsSurface& s = body[0];  // the same face with a knot line in the middle
+  NurbsSurface split = s;
+  split.size_u = 3;
+  split.knots_u = {0, 0, 0.5, 1, 1};
+  split.points.clear();
+  for (int i = 0; i < 3; ++i) {
+    for (int j = 0; j < 2; ++j)
+      split.points.push_back((1 - 0.5 * i) * s.point(0, j) + 0.5 * i * s.point(1, j));
+  }
+  s = split;
+  EXPECT_TRUE(contains(error_of(body), "has no partner")) << error_of(body);
+}
+
+TEST(Connectivity, TwoBodiesAreRefused) {
+  Surfaces body = box({1, 1, 1}), other = box({1, 1, 1});
+  move(other, Mat3::Identity(), Vec3(5, 0, 0));
+  body.insert(body.end(), other.begin(), other.end());
+  EXPECT_EQ(error_of(body),
+            "body: patch 6 is not connected to patch 0: the surfaces bound more than one body");
+}
+
+TEST(Connectivity, OneSidedSurfaceIsRefused) {
+  // A Moebius band closed along its rim by a collapsed patch: bilinear quads around a half-twisted strip.
+  const auto corner = [](int k, double side) {
+    const double a = 2 * M_PI * k / 3, half = side * (k == 3 ? -1 : 1);
+    return Vec4(std::cos(a) * (2 + half * std::cos(a / 2)), std::sin(a) * (2 + half * std::cos(a / 2)),
+                half * std::sin(a / 2) * (k == 3 ? 0 : 1), 1);
+  };
+  Surfaces body;
+  NurbsSurface quad;
+  quad.degree_u = quad.degree_v = 1;
+  quad.size_u = quad.size_v = 2;
+  quad.knots_u = quad.knots_v = {0, 0, 1, 1};
+  const Vec4 apex(0, 0, 5, 1);
+  const auto side = [&](int k, double s) { return k == 3 ? corner(0, -s) : corner(k, s); };
+  for (int k = 0; k < 3; ++k) {
+    quad.points = {side(k, -1), side(k, 1), side(k + 1, -1), side(k + 1, 1)};
+    body.push_back(quad);
+    for (double s : {-1.0, 1.0}) {
+      quad.points = {side(k, s), apex, side(k + 1, s), apex};
+      body.push_back(quad);
+    }
+  }
+  EXPECT_EQ(error_of(body), "body: the patches close on a one-sided surface, which has no inside");
+}
+
+TEST(Orientation, InsideOutIsRepairedWithAWarning) {
+  Surfaces body = exact_ellipsoid({1, 2, 3});
+  for (NurbsSurface& s : body) s = swap_uv(s);
+  std::vector<std::string> warnings;
+  const auto shape = build(body, &warnings);
+  expect_consistent(*shape);
+  EXPECT_GT(shape->mass.volume, 0);
+  EXPECT_GT(shape->mass.inertia(0, 0), 0);
+  ASSERT_EQ(warnings.size(), 1u);
+  EXPECT_EQ(warnings[0], "body: the body was inside out: every patch has been turned to face outward");
+}
+
+TEST(Orientation, SinglePatchesAreRepairedAndNamed) {
+  Surfaces body = exact_ellipsoid({1, 2, 3});
+  for (int i : {0, 4}) body[i] = swap_uv(body[i]);
+  std::vector<std::string> warnings;
+  expect_consistent(*build(body, &warnings));
+  ASSERT_EQ(warnings.size(), 1u);
+  EXPECT_EQ(warnings[0], "body: patches 0, 4 faced inward and have been turned outward");
+}
+
+TEST(Orientation, FlatBodyEnclosesNoVolume) {
+  const NurbsSurface side = box({1, 1, 1})[0];
+  EXPECT_TRUE(contains(error_of({side, side}), "body: the patches enclose no volume"))
+      << error_of({side, side});
+  EXPECT_NE(error_of(box({1, 1, 0})), "accepted");
+  NurbsSurface point = box({1, 1, 1})[0];
+  for (Vec4& p : point.points) p = Vec4(1, 2, 3, 1);
+  EXPECT_EQ(error_of({point}), "body: all control points coincide");
+  EXPECT_EQ(error_of({}), "body: no surfaces");
+}
+
+TEST(Shape, SurfaceDefectsNameThePatch) {
+  Surfaces body = box({1, 1, 1});
+  body[2].points[1][3] = -1;
+  EXPECT_EQ(error_of(body), "body: patch 2: weight[1] = -1, must be > 0 and finite");
+}
+
+// --- bounds
+// ----------------------------------------------------------------------------------------------------
+
+TEST(Bounds, CentreOfMassIsTheOrigin) {
+  Surfaces body = exact_ellipsoid({1, 2, 3});
+  move(body, Mat3::Identity(), Vec3(10, -20, 30));
+  const auto shape = build(body);
+  EXPECT_LT((shape->mass.center - Vec3(10, -20, 30)).norm(), 1e-12);
+  EXPECT_NEAR(evaluate0(shape->patches[0], 0.5, 0.5).norm(),
+              evaluate0(build(exact_ellipsoid({1, 2, 3}))->patches[0], 0.5, 0.5).norm(), 1e-12);
+}
+
+TEST(Bounds, RadiiOfEllipsoidsAreTightAndSafe) {
+  Random random(2);
+  for (int trial = 0; trial < 10; ++trial) {
+    const Vec3 a(uniform(random, 0.2, 3), uniform(random, 0.2, 3), uniform(random, 0.2, 3));
+    Surfaces body = exact_ellipsoid(a);
+    move(body, random_rotation(random).toRotationMatrix(), Vec3(1, 2, 3));
+    const auto shape = build(body);
+    EXPECT_GE(shape->bounding_radius, a.maxCoeff() * (1 - 1e-14));
+    EXPECT_LE(shape->bounding_radius, a.maxCoeff() * (1 + 1e-6));
+    EXPECT_LE(shape->inner_radius, a.minCoeff() * (1 + 1e-14));
+    EXPECT_GE(shape->inner_radius, a.minCoeff() * (1 - 1e-6));
+  }
+}
+
+TEST(Bounds, HoldEverySampledPoint) {
+  for (const Surfaces& body :
+       {pebble(), fitted_ellipsoid({1, 2, 0.7}, 1), revolved_ellipsoid(3, 1), box({1, 2, 3})}) {
+    const auto shape = build(body);
+    double least = std::numeric_limits<double>::infinity(), most = 0;
+    for (const BezierPatch& patch : shape->patches) {
+      for (int i = 0; i <= 60; ++i) {
+        for (int j = 0; j <= 60; ++j) {
+          const double r = evaluate0(patch, i / 60.0, j / 60.0).norm();
+          least = std::min(least, r);
+          most = std::max(most, r);
+        }
+      }
+    }
+    EXPECT_GE(shape->bounding_radius, most);
+    EXPECT_LE(shape->bounding_radius, most * 1.001);
+    EXPECT_LE(shape->inner_radius, least);
+    EXPECT_GE(shape->inner_radius, least * 0.999);
+  }
+}
+
+// --- kinks and curvature
+// -----------------------------------------------------------------------------------------
+
+TEST(Kinks, BoxEdgesOpenByARightAngle) {
+  const auto shape = build(box({1, 2, 3}));
+  for (const auto& links : shape->links) {
+    for (const EdgeLink& link : links) EXPECT_NEAR(link.kink, M_PI / 2, 1e-14);
+  }
+  EXPECT_FALSE(shape->smooth);
+  EXPECT_EQ(shape->curvature.min_radius, 0);
+  EXPECT_EQ(shape->curvature.max_radius, std::numeric_limits<double>::infinity());
+  EXPECT_LT(shape->concavity, 1e-14);
+}
+
+TEST(Kinks, ConePolesAreNotSmooth) {
+  const auto shape = build(revolve({{0, -1}, {1, 0}, {0, 1}}));
+  EXPECT_FALSE(shape->smooth);
+  for (size_t p = 0; p < shape->links.size(); ++p) EXPECT_NEAR(shape->links[p][2].kink, M_PI / 3, 1e-3);
+  EXPECT_EQ(shape->curvature.min_radius, 0);
+}
+
+TEST(Kinks, ImperfectBicubicJointsLoad) {
+  std::vector<std::string> warnings;
+  const auto shape = build(fitted_ellipsoid({1, 1.3, 0.8}, 1), &warnings);
+  EXPECT_FALSE(shape->smooth);
+  EXPECT_LT(shape->concavity, 1e-4);
+  EXPECT_EQ(shape->curvature.min_radius, 0);
+  EXPECT_GT(shape->patch_curvature.min_radius, 0.3);
+}
+
+TEST(Curvature, BoundsOfEllipsoidsHoldAndAreClose) {
+  Random random(3);
+  for (int trial = 0; trial < 10; ++trial) {
+    Vec3 a(uniform(random, 0.5, 2), uniform(random, 0.5, 2), uniform(random, 0.5, 2));
+    const auto shape = build(exact_ellipsoid(a));
+    std::sort(a.data(), a.data() + 3);
+    const double least = a[0] * a[0] / a[2], most = a[2] * a[2] / a[0];
+    EXPECT_LE(shape->curvature.min_radius, least);
+    EXPECT_GE(shape->curvature.min_radius, 0.9 * least);
+    EXPECT_GE(shape->curvature.max_radius, most);
+    EXPECT_LE(shape->curvature.max_radius, 1.1 * most);
+  }
+}
+
+TEST(Curvature, SphereIsRecognised) {
+  for (const Surfaces& body : {exact_ellipsoid({2, 2, 2}), revolved_ellipsoid(2, 2)}) {
+    const auto shape = build(body);
+    EXPECT_NEAR(shape->curvature.min_radius, 2, 1e-5);
+    EXPECT_NEAR(shape->curvature.max_radius, 2, 1e-5);
+    EXPECT_NEAR(shape->inner_radius, shape->bounding_radius, 1e-12);
+  }
+}
+
+TEST(Curvature, FlatPolesMakeTheLargestRadiusInfinite) {
+  // Fourth-order contact with the plane z = -1 at the pole.
+  const auto shape = build(revolve({{0, -1}, {0.5, -1}, {1, -1}, {1, 0}, {1, 1}, {0.5, 1}, {0, 1}}));
+  EXPECT_EQ(shape->curvature.max_radius, std::numeric_limits<double>::infinity());
+}
+
+// --- convexity
+// ---------------------------------------------------------------------------------------------------
+
+TEST(Convexity, ShallowWaistIsAcceptedAndItsDepthReported) {
+  for (double b : {-0.03, -0.05}) {
+    const Waisted w = waisted(b);
+    std::vector<std::string> warnings;
+    const auto shape = build(w.body, &warnings);
+    EXPECT_NEAR(shape->concavity / w.depth, 1, 0.02) << b;
+    EXPECT_GT(shape->support_excess, 2 * w.depth);
+    EXPECT_LT(shape->support_excess, 6 * w.depth);
+    ASSERT_EQ(warnings.size(), 1u);
+    EXPECT_TRUE(contains(warnings[0], "body: not quite convex: patch 0, u=")) << warnings[0];
+    EXPECT_EQ(shape->curvature.max_radius, std::numeric_limits<double>::infinity());
+  }
+}
+
+TEST(Convexity, DeepWaistIsRefusedWithItsPlaceAndDepth) {
+  const Waisted w = waisted(-0.3);
+  const std::string error = error_of(w.body);
+  EXPECT_TRUE(contains(error, "body: not convex: patch 0, u=")) << error;
+  EXPECT_TRUE(contains(error, "v=0.5")) << error;
+  const size_t at = error.find("depth ");
+  ASSERT_NE(at, std::string::npos);
+  EXPECT_NEAR(std::stod(error.substr(at + 6)) / w.depth, 1, 0.05) << error;
+}
+
+TEST(Convexity, PlaceIsCountedAsInTheFileWhenThePatchWasTurned) {
+  const std::string error = error_of({swap_uv(waisted(-0.3).body[0])});
+  EXPECT_TRUE(contains(error, "patch 0, u=0.5")) << error;
+}
+
+// Two caps of spheres of radius 1 that overlap: their common circle is a concave joint with this kink.
+Surfaces overlapping_spheres(double kink) {
+  const double end = M_PI / 2 + kink / 2;  // polar angle at which each cap stops, from its pole
+  const double shift = std::cos(end), w = std::cos(end / 4);
+  Surfaces body;
+  for (double sign : {-1.0, 1.0}) {
+    // The meridian in two rational quadratic arcs of half the angle each (NURBS Book, section 7.3).
+    NurbsSurface s = revolve({{0, 0}, {0, 0}, {0, 0}, {0, 0}, {0, 0}})[0];
+    s.degree_v = 2;
+    s.knots_v = {0, 0, 0, 0.5, 0.5, 1, 1, 1};
+    for (int i = 0; i < s.size_u; ++i) {
+      const double wu = i % 2 ? std::sqrt(0.5) : 1;
+      const double c[9] = {1, 1, 0, -1, -1, -1, 0, 1, 1}, d[9] = {0, 1, 1, 1, 0, -1, -1, -1, 0};
+      for (int k = 0; k < 5; ++k) {
+        const double angle = k * end / 4, wv = k % 2 ? w : 1, r = std::sin(angle) / wv;
+        const double z = sign * (std::cos(angle) / wv - shift);
+        s.point(i, k) = wu * wv * Vec4(r * c[i], r * d[i], z, 1);
+      }
+    }
+    body.push_back(s);
+  }
+  return body;
+}
+
+TEST(Convexity, GrooveBetweenTwoSpheres) {
+  for (double kink : {1e-4, 1e-3, 1e-2, 5e-2}) {
+    const auto shape = build(overlapping_spheres(kink));
+    EXPECT_NEAR(shape->concavity / (1 - std::cos(kink / 2)), 1, 0.02) << kink;
+    EXPECT_NEAR(shape->support_excess / (1 - std::cos(kink)), 1, 0.02) << kink;
+    EXPECT_FALSE(shape->smooth);
+    EXPECT_EQ(shape->curvature.max_radius, std::numeric_limits<double>::infinity());
+    double least = 0;
+    for (const auto& links : shape->links) {
+      for (const EdgeLink& link : links) least = std::min(least, link.kink);
+    }
+    EXPECT_NEAR(least, -kink, 1e-10);
+  }
+  EXPECT_TRUE(contains(error_of(overlapping_spheres(0.2)), "not convex: patch "))
+      << error_of(overlapping_spheres(0.2));
+}
+
+TEST(Convexity, ConvexBodiesHaveNoDent) {
+  for (const Surfaces& body : {pebble(), exact_ellipsoid({1, 2, 3}), exact_ellipsoid({1, 1, 0.01}),
+                               revolved_ellipsoid(1, 5), overlapping_spheres(-0.3)}) {
+    std::vector<std::string> warnings;
+    const auto shape = build(body, &warnings);
+    EXPECT_LT(shape->concavity, 1e-12 * shape->bounding_radius);
+    EXPECT_LT(shape->support_excess, 1e-12 * shape->bounding_radius);
+    for (const std::string& w : warnings) EXPECT_FALSE(contains(w, "convex")) << w;
+  }
+}
+
+// --- gyration
+// ----------------------------------------------------------------------------------------------------
+
+TEST(Gyration, IsComputedForTheUniformSolid) {
+  const auto shape = build(exact_ellipsoid({1, 2, 3}));
+  EXPECT_LT((shape->principal_gyration - Vec3(1, 2, 2.6)).norm(), 1e-11);
+  const Mat3 axes = shape->principal_axes.toRotationMatrix();
+  const Mat3 back = axes * shape->principal_gyration.asDiagonal() * axes.transpose();
+  EXPECT_LT((back - shape->gyration).norm(), 1e-12);
+}
+
+TEST(Gyration, GivenTensorReplacesIt) {
+  Mat3 g;
+  g << 2, 0.1, 0.2, 0.1, 2.5, 0.3, 0.2, 0.3, 3;
+  const auto shape = make_shape("body", exact_ellipsoid({1, 2, 3}), g);
+  EXPECT_EQ(shape->gyration, g);
+  const Mat3 axes = shape->principal_axes.toRotationMatrix();
+  EXPECT_LT((axes * shape->principal_gyration.asDiagonal() * axes.transpose() - g).norm(), 1e-14);
+  EXPECT_LT(shape->principal_gyration[0], shape->principal_gyration[1]);
+  EXPECT_LT(shape->principal_gyration[1], shape->principal_gyration[2]);
+}
+
+TEST(Gyration, ImpossibleTensorsAreRefused) {
+  const Surfaces body = exact_ellipsoid({1, 1, 1});
+  Mat3 g = Mat3::Identity();
+  EXPECT_EQ(error_of(body, g), "accepted");
+  g(0, 1) = 0.1;
+  EXPECT_EQ(error_of(body, g), "body: gyration must be symmetric");
+  g = Vec3(1, 1, -1).asDiagonal();
+  EXPECT_TRUE(
+      contains(error_of(body, g), "body: gyration must be positive definite: its eigenvalues are -1, 1, 1"));
+  g = Vec3(1, 1, 2.5).asDiagonal();
+  EXPECT_TRUE(contains(error_of(body, g), "must not exceed the sum of the others"));
+  g(0, 0) = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_EQ(error_of(body, g), "body: gyration must be finite");
+}
+
+}  // namespace
+}  // namespace nurbs

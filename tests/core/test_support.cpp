@@ -1,0 +1,106 @@
+// Support mapping and direction atlas against exhaustive search and closed forms.
+#include <gtest/gtest.h>
+
+#include "bodies.h"
+
+namespace nurbs {
+namespace {
+
+using namespace test;
+
+double exhaustive_support(const Shape& shape, const Vec3& d) {
+  double best = -1e300;
+  for (size_t p = 0; p < shape.patches.size(); ++p)
+    for (const double u : {0.1, 0.5, 0.9})
+      for (const double v : {0.1, 0.5, 0.9}) {
+        const SurfacePoint start{static_cast<int>(p), u, v};
+        best = std::max(best, find_support(shape, d, &start).h);
+      }
+  return best;
+}
+
+TEST(Support, equals_the_closed_form_on_ellipsoids) {
+  Random random(1);
+  const Vec3 axes(1, 0.8, 0.6);
+  for (int k = 0; k < 5000; ++k) {
+    const Vec3 d = random.direction();
+    const Support s = find_support(*ellipsoid(), d);
+    const double h = axes.cwiseProduct(d).norm();
+    const Vec3 point = axes.cwiseProduct(axes).cwiseProduct(d) / h;
+    ASSERT_TRUE(s.converged);
+    ASSERT_NEAR(s.h, h, 1e-14);
+    ASSERT_GE(s.upper, h - 1e-15);
+    ASSERT_LT((s.point - point).norm(), 1e-9);
+  }
+}
+
+TEST(Support, finds_the_global_maximum_from_the_atlas_and_from_far_starts) {
+  Random random(2);
+  for (const ShapePointer& shape : all_shapes()) {
+    for (int k = 0; k < 300; ++k) {
+      const Vec3 d = random.direction();
+      const double best = exhaustive_support(*shape, d);
+      const Support cold = find_support(*shape, d);
+      ASSERT_NEAR(cold.h, best, 1e-12) << shape->name;
+      ASSERT_GE(cold.upper, best - 1e-15) << shape->name;  // both sides' round-off
+      const SurfacePoint far{k % static_cast<int>(shape->patches.size()), random.uniform(0, 1),
+                             random.uniform(0, 1)};
+      ASSERT_NEAR(find_support(*shape, d, &far).h, best, 1e-12) << shape->name;
+    }
+  }
+}
+
+TEST(Support, works_towards_poles_edges_and_corners) {
+  for (const Vec3& d : {Vec3(0, 0, 1), Vec3(0, 0, -1), Vec3(1e-9, 0, 1), Vec3(1e-5, -1e-5, -1)}) {
+    const Vec3 n = d.normalized();
+    EXPECT_NEAR(find_support(*polar(), n).h, std::hypot(std::hypot(n[0], n[1]), 0.5 * n[2]), 1e-14);
+  }
+  const Vec3 corner = Vec3(1, 1, 1).normalized();  // where three patches of the sphere meet
+  EXPECT_NEAR(find_support(*sphere(), corner).h, 1, 1e-15);
+  EXPECT_NEAR(find_support(*cuboid(), corner).h, corner.dot(Vec3(1, 0.8, 0.6)), 1e-15);
+  EXPECT_NEAR(find_support(*cuboid(), Vec3::UnitZ()).h, 0.6, 1e-15);
+}
+
+TEST(Atlas, bounds_the_support_from_above_and_closely) {
+  Random random(3);
+  for (const ShapePointer& shape : all_shapes()) {
+    double loosest = 0;
+    for (int k = 0; k < 2000; ++k) {
+      const Vec3 d = random.direction();
+      const double h = find_hull_support(*shape, d).h, upper = shape->atlas.support_upper(d);
+      ASSERT_GE(upper, h) << shape->name;
+      loosest = std::max(loosest, upper - h);
+    }
+    EXPECT_LT(loosest, 0.05 * shape->bounding_radius) << shape->name;
+  }
+}
+
+TEST(Atlas, is_homogeneous_and_agrees_with_its_nodes) {
+  const DirectionAtlas& atlas = ellipsoid()->atlas;
+  for (int node = 0; node < atlas.nodes(); node += 7) {
+    const Vec3 d = atlas.direction(node);
+    EXPECT_NEAR(atlas.support_upper(3 * d), 3 * atlas.support_upper(d), 1e-14);
+    EXPECT_LT((atlas.direction(atlas.nearest(d)) - d).norm(), 1e-15);
+    EXPECT_NEAR(atlas.support_upper(d), d.dot(atlas.point[node]), 1e-13);
+  }
+}
+
+TEST(Walk, carries_a_tangent_step_into_the_neighbour) {
+  const Shape& shape = *sphere();
+  Random random(4);
+  for (int k = 0; k < 1000; ++k) {
+    SurfacePoint at{k % 6, random.uniform(0, 1), random.uniform(0.9, 1)};
+    const double du = random.uniform(-0.05, 0.05), dv = 0.15;
+    const Jet1 jet = evaluate1(shape.patches[at.patch], at.u, at.v);
+    const Vec3 aim = (jet.s + du * jet.su + dv * jet.sv).normalized();
+    const SurfacePoint to = walk(shape, at, du, dv);
+    EXPECT_LT((evaluate0(shape.patches[to.patch], to.u, to.v) - aim).norm(), 0.1);
+    EXPECT_GE(to.u, 0);
+    EXPECT_LE(to.u, 1);
+    EXPECT_GE(to.v, 0);
+    EXPECT_LE(to.v, 1);
+  }
+}
+
+}  // namespace
+}  // namespace nurbs

@@ -1,0 +1,123 @@
+#!/usr/bin/python3
+"""nurbs-shape: every kind of body makes a file that passes the check; bad input gives one clear line and no file."""
+import json
+import pathlib
+import re
+import subprocess
+import tempfile
+import unittest
+
+import deck
+
+PROGRAM = str(deck.BUILD / "nurbs-shape")
+INERTIA = "1.0,0.9,0.8,-0.04,0.02,0.09"
+KINDS = [["sphere", "--radius", "2"], ["ellipsoid", "--axes", "1,2,3"], ["fitted-ellipsoid", "--axes", "1,2,3"],
+         ["fitted-ellipsoid", "--axes", "1,2,3", "--spans", "2"], ["smooth-ellipsoid", "--axes", "1,2,3"], ["pebble"],
+         ["superellipsoid", "--axes", "1,1,2", "--exponent", "4"], ["revolved", "--equatorial", "2", "--polar", "1"],
+         ["box", "--axes=1,2,3"], ["inertia", "--mass", "2", "--inertia", INERTIA],
+         ["inertia", "--density", "0.5", "--inertia", INERTIA]]
+# Arguments of `make`, and what the error must name.
+BAD = [(["cone"], "cone"),
+       (["sphere", "--radius", "0"], "--radius is 0, must be > 0"),
+       (["sphere", "--radius", "-1"], "--radius is -1"),
+       (["sphere", "--radius", "nan"], "--radius is nan"),
+       (["sphere", "--radius", "1e999"], "--radius"),
+       (["sphere", "--radius", "2x"], "'2x' is not a number"),
+       (["sphere", "--radius"], "--radius needs a value"),
+       (["sphere", "--size", "1"], "unknown option --size"),
+       (["sphere", "--radius", "1", "--radius", "2"], "--radius is given twice"),
+       (["ellipsoid"], "--axes is missing"),
+       (["ellipsoid", "--axes", "1,2"], "--axes has 2 numbers, must have 3"),
+       (["ellipsoid", "--axes", "1,,2"], "'' is not a number"),
+       (["ellipsoid", "--axes", "1,2,3,"], "'' is not a number"),
+       (["fitted-ellipsoid", "--axes", "1,2,3", "--spans", "0"], "must be in 1..12"),
+       (["fitted-ellipsoid", "--axes", "1,2,3", "--spans", "1.5"], "whole number"),
+       (["superellipsoid", "--axes", "1,2,3"], "--exponent is missing"),
+       (["superellipsoid", "--axes", "1,2,3", "--exponent", "1"], "must be in 2..12"),
+       (["inertia", "--inertia", INERTIA], "--mass or --density is missing"),
+       (["inertia", "--inertia", "1,1,3,0,0,0", "--mass", "1"], "less than the sum of the other two"),
+       (["inertia", "--inertia", INERTIA, "--mass", "1", "--density", "1"], "--density is 1, must be within 0.1 %")]
+
+
+def call(*arguments):
+    return subprocess.run([PROGRAM, *arguments], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, timeout=120)
+
+
+class NurbsShape(unittest.TestCase):
+    def setUp(self):
+        self.directory = tempfile.TemporaryDirectory()
+        self.addCleanup(self.directory.cleanup)
+        self.place = pathlib.Path(self.directory.name)
+        self.file = self.place / "shape.json"
+
+    def assert_one_error(self, run, text):
+        self.assertEqual(run.returncode, 1, run.stderr)
+        self.assertEqual(run.stdout, "")
+        self.assertRegex(run.stderr, r"\AERROR: [^\n]*\n\Z")
+        self.assertIn(text, run.stderr)
+
+    def test_every_kind_is_usable(self):
+        for kind in KINDS:
+            with self.subTest(kind=kind):
+                made = call("make", *kind, "-o", str(self.file))
+                self.assertEqual(made.returncode, 0, made.stderr)
+                self.assertEqual([p.name for p in self.place.iterdir()], ["shape.json"])
+                data = json.loads(self.file.read_text())["shape"]
+                self.assertEqual(len(data["data"]), 1 if kind[0] == "revolved" else 6)
+                check = call("check", str(self.file))
+                self.assertEqual(check.returncode, 0, check.stderr)
+                self.assertIn("usable", check.stdout)
+
+    def test_info_names_mass_and_inertia(self):
+        self.assertEqual(call("make", "sphere", "--radius", "2", "-o", str(self.file)).returncode, 0)
+        info = call("info", str(self.file)).stdout
+        self.assertAlmostEqual(float(re.search(r"volume +(\S+)", info)[1]), 33.510321638, 8)
+        self.assertAlmostEqual(float(re.search(r"bounding radius +(\S+)", info)[1]), 2, 6)
+        self.assertAlmostEqual(float(re.search(r"inertia / mass +xx (\S+)", info)[1]), 1.6, 9)
+
+    def test_density_sets_the_mass_of_a_given_inertia(self):
+        made = call("make", "inertia", "--density", "0.5", "--inertia", INERTIA, "-o", str(self.file))
+        mass, density = (float(x) for x in re.search(r"mass (\S+) and .* density (\S+)", made.stdout).groups())
+        self.assertAlmostEqual(density, 0.5, 9)
+        info = call("info", str(self.file)).stdout
+        xx, yy, zz = (float(x) for x in re.search(r"xx (\S+) yy (\S+) zz (\S+)", info).groups())
+        for got, wanted in zip((xx, yy, zz), (1.0, 0.9, 0.8)):
+            self.assertAlmostEqual(mass * got, wanted, 8)
+
+    def test_bad_arguments_leave_the_old_file(self):
+        self.file.write_text("old")
+        for arguments, text in BAD:
+            with self.subTest(arguments=arguments):
+                self.assert_one_error(call("make", *arguments, "-o", str(self.file)), text)
+                self.assertEqual([p.name for p in self.place.iterdir()], ["shape.json"])
+                self.assertEqual(self.file.read_text(), "old")
+
+    def test_no_or_impossible_output(self):
+        self.assert_one_error(call("make", "pebble"), "no output file")
+        self.assert_one_error(call("make", "pebble", "-o", str(self.place / "none" / "a.json")), "can't write")
+        self.assert_one_error(call("make", "pebble", "-o", str(self.place)), "can't write")
+        self.assertEqual(list(self.place.iterdir()), [])
+
+    def test_unusable_files(self):
+        self.assert_one_error(call("check", str(self.place / "none.json")), "none.json")
+        self.file.write_text("{")
+        self.assert_one_error(call("check", str(self.file)), "shape.json")
+        self.assertEqual(call("make", "box", "--axes", "1,1,1", "-o", str(self.file)).returncode, 0)
+        data = json.loads(self.file.read_text())
+        data["shape"]["data"].pop()
+        data["shape"]["count"] -= 1
+        self.file.write_text(json.dumps(data))
+        self.assert_one_error(call("check", str(self.file)), "edge")
+        self.assert_one_error(call("info", str(self.file)), "edge")
+
+    def test_usage(self):
+        for arguments in ([], ["paint"], ["make"], ["check"], ["info", "a", "b"]):
+            self.assert_one_error(call(*arguments), "")
+        for arguments in (["--help"], ["make", "--help"], ["make", "box", "--help"], ["check", "--help"]):
+            run = call(*arguments)
+            self.assertEqual(run.returncode, 0)
+            self.assertTrue(run.stdout.startswith("usage: nurbs-shape"))
+
+
+if __name__ == "__main__":
+    unittest.main()
