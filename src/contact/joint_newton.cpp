@@ -2,31 +2,23 @@
 // notes there.
 #include "contact/joint_newton.h"
 
+#include <algorithm>
 #include <cmath>
 
 namespace nurbs {
 namespace {
 
+using Slot = JetLanes::Slot;
+
 // Both surfaces at the current parameters, in the pair frame.
-void evaluate(const PairFrame& pair, const Mat3& frame_b, JointSolution& s) {
+NURBS_INLINE void evaluate(const PairFrame& pair, const Mat3& frame_b, JointSolution& s) {
   s.base_a = s.points.on_a;
   s.base_b = s.points.on_b;
-  s.jet_a = evaluate2(pair.a->patches[s.base_a.patch], s.base_a.u, s.base_a.v);
-  const Jet2 b = evaluate2(pair.b->patches[s.base_b.patch], s.base_b.u, s.base_b.v);
-  for (Vec3* x : {&s.jet_a.s, &s.jet_a.su, &s.jet_a.sv, &s.jet_a.suu, &s.jet_a.suv, &s.jet_a.svv})
-    *x *= pair.scale_a;
-  s.jet_b.s.noalias() = frame_b * b.s + pair.offset;
-  s.jet_b.su.noalias() = frame_b * b.su;
-  s.jet_b.sv.noalias() = frame_b * b.sv;
-  s.jet_b.suu.noalias() = frame_b * b.suu;
-  s.jet_b.suv.noalias() = frame_b * b.suv;
-  s.jet_b.svv.noalias() = frame_b * b.svv;
+  evaluate2(pair.a->patches[s.base_a.patch], s.base_a.u, s.base_a.v, &s.jet_a);
+  evaluate2(pair.b->patches[s.base_b.patch], s.base_b.u, s.base_b.v, &s.jet_b);
+  scale(pair.scale_a, &s.jet_a);
+  place(frame_b, pair.offset, &s.jet_b);
 }
-
-struct Steps {
-  Vec2 a, b;
-  bool regular;
-};
 
 bool invert(const Mat2& m, Mat2* inverse) {
   const double det = m(0, 0) * m(1, 1) - m(0, 1) * m(1, 0);
@@ -37,27 +29,52 @@ bool invert(const Mat2& m, Mat2* inverse) {
   return true;
 }
 
+Mat2 symmetric(double a, double b, double c) {
+  Mat2 m;
+  m << a, b, b, c;
+  return m;
+}
+
+// The tangents and the fundamental forms of a surface; `along` is the direction the second form is taken in.
+struct Forms {
+  Vec3 su, sv;
+  Mat2 first, second;
+  Forms(const JetLanes& j, const Vec3& along) : su(j.at(Slot::kSu)), sv(j.at(Slot::kSv)) {
+    Lane8 bend;
+    dot(j, along, &bend);
+    first = symmetric(su.squaredNorm(), su.dot(sv), sv.squaredNorm());
+    second = symmetric(bend[3], bend[4], bend[5]);
+  }
+};
+
+struct Steps {
+  Vec2 a, b;
+  bool regular;
+  Mat2 metric;  // of A, inverse
+};
+
 // One Newton system, eliminated by 2 x 2 blocks: the first (metric of A) is regular near any contact, the
-// Schur complement is the relative curvature.
-Steps newton_step(const Jet2& a, const Jet2& b, const Vec3& normal_a) {
-  const Vec3 g = a.s - b.s;
-  const Vec3 nu = a.suu.cross(a.sv) + a.su.cross(a.suv);
-  const Vec3 nv = a.suv.cross(a.sv) + a.su.cross(a.svv);
-  const Vec2 f1(g.dot(a.su), g.dot(a.sv)), f2(b.su.dot(normal_a), b.sv.dot(normal_a));
-  Mat2 m11, m12, m21, m22;
-  const double uv = a.su.dot(a.sv) + g.dot(a.suv);
-  m11 << a.su.squaredNorm() + g.dot(a.suu), uv, uv, a.sv.squaredNorm() + g.dot(a.svv);
-  m12 << -b.su.dot(a.su), -b.sv.dot(a.su), -b.su.dot(a.sv), -b.sv.dot(a.sv);
-  m21 << b.su.dot(nu), b.su.dot(nv), b.sv.dot(nu), b.sv.dot(nv);
-  const double bend = b.suv.dot(normal_a);
-  m22 << b.suu.dot(normal_a), bend, bend, b.svv.dot(normal_a);
-  Steps steps{Vec2::Zero(), Vec2::Zero(), false};
+// Schur complement is the relative curvature. n_A turns by Weingarten's equations, so with C = T' I_A^-1 the
+// coordinates of B's tangents among A's, d(B_i . n_A) / dA_j = - sum_k C_ik n_A . A_kj, exactly.
+NURBS_INLINE Steps newton_step(const PointPair& p, const JetLanes& ja, const Forms& a, const Forms& b) {
+  const Vec3 g = p.a - p.b;
+  Lane8 with_g;
+  dot(ja, g, &with_g);
+  const Vec2 f1(with_g[1], with_g[2]), f2(b.su.dot(p.na), b.sv.dot(p.na));
+  Mat2 t;
+  t << a.su.dot(b.su), a.su.dot(b.sv), a.sv.dot(b.su), a.sv.dot(b.sv);
+  const Mat2 m11 = a.first + symmetric(with_g[3], with_g[4], with_g[5]);
+  Steps steps;
+  steps.a.setZero();
+  steps.b.setZero();
+  steps.regular = false;
   Mat2 inverse11, inverse_schur;
-  if (!invert(m11, &inverse11)) return steps;
+  if (!invert(a.first, &steps.metric) || !invert(m11, &inverse11)) return steps;
+  const Mat2 m21 = -(t.transpose() * steps.metric) * a.second;
   const Mat2 left = m21 * inverse11;
-  if (!invert(m22 - left * m12, &inverse_schur)) return steps;
+  if (!invert(b.second + left * t, &inverse_schur)) return steps;
   steps.b = inverse_schur * (left * f1 - f2);
-  steps.a = -(inverse11 * (f1 + m12 * steps.b));
+  steps.a = inverse11 * (t * steps.b - f1);
   const double largest = std::max(steps.a.cwiseAbs().maxCoeff(), steps.b.cwiseAbs().maxCoeff());
   steps.regular = std::isfinite(largest);
   if (largest > kLargestStep) {
@@ -65,10 +82,6 @@ Steps newton_step(const Jet2& a, const Jet2& b, const Vec3& normal_a) {
     steps.b *= kLargestStep / largest;
   }
   return steps;
-}
-
-Vec3 taylor(const Jet2& j, const Vec2& d) {
-  return j.s + d[0] * (j.su + 0.5 * d[0] * j.suu + d[1] * j.suv) + d[1] * (j.sv + 0.5 * d[1] * j.svv);
 }
 
 bool inside(const SurfacePoint& p, const Vec2& d) {
@@ -88,28 +101,61 @@ struct Normal {
   Vec3 direction;
   bool polar;
 };
-Normal outward(const Jet2& j, const SurfacePoint& at) {
-  const double lu = j.su.squaredNorm(), lv = j.sv.squaredNorm();
+NURBS_INLINE Normal outward(const JetLanes& j, const SurfacePoint& at) {
+  const Vec3 su = j.at(Slot::kSu), sv = j.at(Slot::kSv);
+  const double lu = su.squaredNorm(), lv = sv.squaredNorm();
   constexpr double kLost = kPoleNormal * kPoleNormal;
-  if (lu < kLost * lv) return {(at.v < 0.5 ? j.suv.cross(j.sv) : j.sv.cross(j.suv)).normalized(), true};
-  if (lv < kLost * lu) return {(at.u < 0.5 ? j.su.cross(j.suv) : j.suv.cross(j.su)).normalized(), true};
-  return {j.su.cross(j.sv).normalized(), false};
+  Normal n{su.cross(sv), lu < kLost * lv || lv < kLost * lu};
+  if (n.polar) {
+    const Vec3 suv = j.at(Slot::kSuv);
+    n.direction = lu < lv ? suv.cross(sv) : su.cross(suv);
+    if ((lu < lv ? at.v : at.u) >= 0.5) n.direction = -n.direction;
+  }
+  n.direction.normalize();
+  return n;
 }
 
-// Point and normal after a step, from the Taylor series. False where the second-order part of the normal is
-// no small share of its turn: next to a pole the normal's length is of second order in the step and its
-// direction therefore anything.
-bool refine(const Shape& shape, const Jet2& j, const Vec2& d, SurfacePoint* at, Vec3* point, Vec3* normal) {
-  const Vec3 change_u = d[0] * j.suu + d[1] * j.suv, change_v = d[0] * j.suv + d[1] * j.svv;
-  const Vec3 area = (j.su + change_u).cross(j.sv + change_v), second = change_u.cross(change_v);
-  const double length = area.norm();
-  const Vec3 turned = area / length;
-  const double tilt = (second - turned.dot(second) * turned).norm() / length;
-  const double turn = (turned - *normal).norm();
-  if (!(tilt <= kNormalTrust * turn + kNormalNoise) || !(turned.dot(*normal) > 0)) return false;
-  *normal = turned;
-  *point = taylor(j, d);
-  *at = advance(shape, *at, d);
+// Whether the tangents change so little in a step that the normal turns linearly: not next to a pole.
+NURBS_INLINE bool turns_linearly(const JetLanes& j, const Vec2& d) {
+  const Lane8 length2 = j.x * j.x + j.y * j.y + j.z * j.z;
+  const double uu = d[0] * d[0], vv = d[1] * d[1];
+  constexpr double kTrust = 0.5 * kNormalTrust * kNormalTrust;
+  return uu * length2[3] + vv * length2[4] <= kTrust * length2[1] &&
+         uu * length2[4] + vv * length2[5] <= kTrust * length2[2];
+}
+
+// The normal after a step, not normalised: Weingarten's equations.
+NURBS_INLINE Vec3 turned_normal(const Vec3& n, const Forms& f, const Mat2& inverse, const Vec2& d) {
+  const Vec2 turn = inverse * (f.second * d);
+  return n - turn[0] * f.su - turn[1] * f.sv;
+}
+
+// How far the points are from lying on one line along d, squared.
+double misfit2(const Vec3& d, const Vec3& g) {
+  return (g - d.dot(g) * d).squaredNorm();
+}
+
+// Spends a step already solved for on a second-order update of points and normal.
+NURBS_INLINE bool refine(const PairFrame& pair, JointSolution& s, const Forms& a, const Forms& b,
+                         const Steps& steps) {
+  PointPair& p = s.points;
+  Mat2 metric_b;
+  if (!turns_linearly(s.jet_a, steps.a) || !turns_linearly(s.jet_b, steps.b) || !invert(b.first, &metric_b))
+    return false;
+  // b.second was taken along A's normal, which is -n_B here up to second order.
+  const Vec3 normal = (turned_normal(p.na, a, steps.metric, steps.a) -
+                       turned_normal(p.nb, b, -metric_b, steps.b))
+                          .normalized();
+  const Vec3 at_a = taylor(s.jet_a, steps.a[0], steps.a[1]), at_b = taylor(s.jet_b, steps.b[0], steps.b[1]);
+  const double noise = kRoundoff * pair.reach;
+  if (!(misfit2(normal, at_b - at_a) <= misfit2(p.na, p.b - p.a) + noise * noise)) return false;
+  p.a = at_a;
+  p.b = at_b;
+  p.na = normal;
+  p.nb = -normal;
+  p.on_a = advance(*pair.a, p.on_a, steps.a);
+  p.on_b = advance(*pair.b, p.on_b, steps.b);
+  s.normal = normal;
   return true;
 }
 
@@ -124,18 +170,11 @@ bool far_enough(const Bracket& bracket, double enough) {
   return bracket.lower > enough && bracket.width() <= 0.5 * (bracket.lower - enough);
 }
 
-// How far the points are from lying on one line along the normals; a length.
-double misfit(const PointPair& p) {
-  const Vec3 d = (p.na - p.nb).normalized(), g = p.b - p.a;
-  return (g - d.dot(g) * d).norm();
-}
-
 // Normals opposite and the points on one line along them.
 bool is_stationary(const PairFrame& pair, const PointPair& p) {
-  const Vec3 d = (p.na - p.nb).normalized();
-  const Vec3 g = p.b - p.a;
-  return (p.na + p.nb).norm() <= kStationary && (g - d.dot(g) * d).norm() <= kStationary * pair.size &&
-         p.na.dot(p.nb) < 0;
+  if (!((p.na + p.nb).squaredNorm() <= kStationary * kStationary && p.na.dot(p.nb) < 0)) return false;
+  const double allowed = kStationary * pair.size;
+  return misfit2((p.na - p.nb).normalized(), p.b - p.a) <= allowed * allowed;
 }
 
 }  // namespace
@@ -147,30 +186,21 @@ JointSolution solve_joint(const PairFrame& pair, const SurfacePoint& on_a, const
   p.on_a = on_a;
   p.on_b = on_b;
   const Mat3 frame_b = pair.scale_b * pair.turn;
-  const Jet2 &ja = out.jet_a, &jb = out.jet_b;
-  for (out.iterations = 0;;) {
+  for (out.iterations = 1;; ++out.iterations) {
     evaluate(pair, frame_b, out);
-    p.a = ja.s;
-    p.b = jb.s;
-    const Normal na = outward(ja, p.on_a), nb = outward(jb, p.on_b);
+    p.a = out.jet_a.at(Slot::kS);
+    p.b = out.jet_b.at(Slot::kS);
+    const Normal na = outward(out.jet_a, p.on_a), nb = outward(out.jet_b, p.on_b);
     p.na = na.direction;
     p.nb = nb.direction;
     out.bracket = certify(pair, p);
     out.converged = close_enough(out.bracket, tolerance, pair.size) || far_enough(out.bracket, enough);
-    out.stationary = is_stationary(pair, p);
-    const Steps steps = newton_step(ja, jb, ja.su.cross(ja.sv));
-    ++out.iterations;
+    out.stationary = !out.converged && is_stationary(pair, p);
+    const Forms a(out.jet_a, p.na), b(out.jet_b, p.na);
+    const Steps steps = newton_step(p, out.jet_a, a, b);
     if (out.converged || out.stationary) {
-      PointPair next = p;
-      if (steps.regular && !na.polar && !nb.polar &&
-          refine(*pair.a, ja, steps.a, &next.on_a, &next.a, &next.na) &&
-          refine(*pair.b, jb, steps.b, &next.on_b, &next.b, &next.nb) &&
-          misfit(next) <= misfit(p) + kRoundoff * pair.reach) {
-        p = next;
-        out.normal = (p.na - p.nb).normalized();
-      } else {
+      if (!(steps.regular && !na.polar && !nb.polar && refine(pair, out, a, b, steps)))
         out.normal = out.converged ? out.bracket.direction : Vec3((p.na - p.nb).normalized());
-      }
       out.gap = out.normal.dot(p.b - p.a);
       if (out.converged) out.gap = std::clamp(out.gap, out.bracket.lower, out.bracket.upper);
       return out;

@@ -9,7 +9,7 @@ namespace nurbs {
 struct JointSolution {
   PointPair points;             // refined by the last Newton step: position error O(angle^2), see solve_joint
   SurfacePoint base_a, base_b;  // the parameters evaluated last ...
-  Jet2 jet_a, jet_b;            // ... and the surfaces there, pair frame, lengths of the lab
+  JetLanes jet_a, jet_b;        // ... and the surfaces there, pair frame, lengths of the lab
   Bracket bracket;              // certified, of the pair of points evaluated last
   Vec3 normal;                  // unit, from A towards B
   double gap;       // normal . (b - a) at the refined points, error O(angle^3), kept inside the bracket
@@ -18,7 +18,7 @@ struct JointSolution {
   bool stationary;  // a common normal within kStationary, certified or not
 };
 
-// Solves g.A_u = g.A_v = 0, B_u.N_A = B_v.N_A = 0 with g = A - B, N_A = A_u x A_v, starting from `on_a`,
+// Solves g.A_u = g.A_v = 0, B_u.n_A = B_v.n_A = 0 with g = A - B and A's unit normal n_A, starting from `on_a`,
 // `on_b`; regular at g = 0. Stops as soon as the certificate's bracket is within `tolerance` (a length), then
 // spends the step already solved for on a second-order update of the points. Two second-derivative
 // evaluations an iteration; gives up (converged = false) after `cap` iterations or where the relative

@@ -43,39 +43,33 @@ struct Turned {
   }
 };
 
-// Least distance along the surface from `at` to its patch's edges, roughly: exact to first order in the
-// parameters.
-double distance_to_edges(const SurfacePoint& at, const Jet2& jet) {
-  const double area = jet.su.cross(jet.sv).norm();
-  const double across_u = area / jet.sv.norm(), across_v = area / jet.su.norm();
-  return std::min(across_u * std::min(at.u, 1 - at.u), across_v * std::min(at.v, 1 - at.v));
-}
-
 }  // namespace
 
-bool make_support_model(const Mat3& axes, const Vec3& center, const SurfacePoint& at, const Jet2& jet,
+bool make_support_model(const Mat3& axes, const Vec3& center, const SurfacePoint& at, const JetLanes& jet,
                         double rate, SupportModel* model) {
-  const Vec3 cross = jet.su.cross(jet.sv);
-  const double area = cross.norm();
+  using Slot = JetLanes::Slot;
+  const Vec3 su = jet.at(Slot::kSu), sv = jet.at(Slot::kSv), cross = su.cross(sv);
+  const double area = cross.norm(), lu = su.norm(), lv = sv.norm();
   if (!(area > 0)) return false;
-  const Vec3 n = cross / area;
-  const double l = -n.dot(jet.suu), m = -n.dot(jet.suv), k = -n.dot(jet.svv);
-  const double det = l * k - m * m;
+  const Vec3 n = cross / area, t = su / lu, s = n.cross(t);
+  Lane8 bend;
+  dot(jet, n, &bend);
+  const double l = -bend[3], m = -bend[4], k = -bend[5], det = l * k - m * m;
   if (!(det > 0) || !(l > 0)) return false;
-  const Vec3 t = jet.su.normalized(), s = n.cross(t);
-  Mat2 j, inverse;
-  j << t.dot(jet.su), t.dot(jet.sv), s.dot(jet.su), s.dot(jet.sv);
-  inverse << k / det, -m / det, -m / det, l / det;
-  const Mat2 w = j * inverse * j.transpose();
+  // J = (lu, t.sv; 0, s.sv) takes parameters to the frame (t, s); W = J II^-1 J'.
+  const double shear = t.dot(sv), height = s.dot(sv), r = 1 / det;
+  const double across = r * (lu * k - shear * m), along = r * (shear * l - lu * m);
+  model->w[0] = lu * across + shear * along;
+  model->w[1] = height * along;
+  model->w[2] = r * height * height * l;
   model->rate = rate;
-  model->room = kRoomShare * distance_to_edges(at, jet);
-  store(axes * (jet.s - center), model->arm);
+  // Distance along the surface to the patch's edges, exact to first order in the parameters.
+  const double across_u = area / lv * std::min(at.u, 1 - at.u), across_v = area / lu * std::min(at.v, 1 - at.v);
+  model->room = kRoomShare * std::min(across_u, across_v);
+  store(axes * (jet.at(Slot::kS) - center), model->arm);
   store(axes * n, model->normal);
   store(axes * t, model->tangent);
-  model->w[0] = w(0, 0);
-  model->w[1] = w(0, 1);
-  model->w[2] = w(1, 1);
-  return w.allFinite() && std::isfinite(model->rate);
+  return std::isfinite(model->w[0] + model->w[1] + model->w[2]) && std::isfinite(rate);
 }
 
 Mat3 turn_since(const Quat& q, const double* q0) {

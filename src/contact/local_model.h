@@ -44,7 +44,7 @@ struct LocalContact {
 // Fills a body's half from the jet at its contact point `at`, given in axes that `axes` turns into the lab,
 // lengths of the lab; `center` is the body's centre of mass there, `rate` its L. False where W is not finite
 // and positive: the model then can't serve.
-bool make_support_model(const Mat3& axes, const Vec3& center, const SurfacePoint& at, const Jet2& jet,
+bool make_support_model(const Mat3& axes, const Vec3& center, const SurfacePoint& at, const JetLanes& jet,
                         double rate, SupportModel* model);
 
 // Rotation from the reference orientation q0 (w x y z) to q, as a matrix.

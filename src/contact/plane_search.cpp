@@ -14,8 +14,9 @@ namespace {
 void remember_plane_model(const Particle& particle, const Mat3& axes, const Support& support, PairMemory& m) {
   const Shape& shape = *particle.shape;
   if (shape.support_excess > kRoundoff * shape.bounding_radius) return;
-  Jet2 jet = evaluate2(shape.patches[support.where.patch], support.where.u, support.where.v);
-  for (Vec3* x : {&jet.s, &jet.su, &jet.sv, &jet.suu, &jet.suv, &jet.svv}) *x *= particle.scale;
+  JetLanes jet;
+  evaluate2(shape.patches[support.where.patch], support.where.u, support.where.v, &jet);
+  scale(particle.scale, &jet);
   const double rate = particle.scale * shape.curvature_rate[support.where.patch];
   if (make_support_model(axes, Vec3::Zero(), support.where, jet, rate, &m.model.b)) m.known = 3;
 }

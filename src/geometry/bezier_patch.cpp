@@ -3,45 +3,26 @@
 // time; every other pair of degrees runs the same code with run-time bounds.
 #include "geometry/bezier_patch.h"
 
-#include <cstring>
+#include "geometry/lanes.h"
 
 namespace nurbs {
 namespace {
 
-using Lane4 = double __attribute__((vector_size(32)));
-
-// Helpers are inlined so that no vector crosses a call: the calling convention then does not depend on the
-// ARCH.
-#define NURBS_INLINE inline __attribute__((always_inline))
-
-NURBS_INLINE void load(const Vec4& from, Lane4& to) {
-  std::memcpy(&to, from.data(), sizeof to);
-}
-
-NURBS_INLINE void to_vec3(const Lane4& lanes, Vec3& out) {
-  out[0] = lanes[0];
-  out[1] = lanes[1];
-  out[2] = lanes[2];
-}
-
-// Bernstein polynomials of degree n and their first `Order` derivatives at t: b[k][i] is the k-th derivative
-// of B_{i,n}. The basis is raised one degree at a time; the k-th derivative is n!/(n-k)! times the k-th
-// backward difference of the basis of degree n - k. N is the degree, or 0 to take it at run time.
-template <int N, int Order>
-NURBS_INLINE void bernstein(int degree, double t, double (&b)[Order + 1][kMaxDegree + 1]) {
+// Bernstein polynomials of degree n and their first `Order` derivatives at t, the latter over n!/(n-k)!: b[k][i]
+// is the k-th backward difference of the basis of degree n - k. The basis is raised one degree at a time. N is
+// the degree, or 0 to take it at run time; Real a number, or several side by side.
+template <int N, int Order, class Real>
+NURBS_INLINE void bernstein(int degree, const Real& t, Real (&b)[Order + 1][kMaxDegree + 1]) {
   const int n = N ? N : degree;
-  const double s = 1.0 - t;
-  double row[kMaxDegree + 1] = {1.0};
+  const Real zero = t - t, s = 1.0 - t;
+  Real row[kMaxDegree + 1] = {zero + 1.0};
 #pragma GCC unroll 10
   for (int m = 0; m <= n; ++m) {
     const int k = n - m;
     if (k <= Order) {
-      double scale = 1.0;
-#pragma GCC unroll 4
-      for (int j = 0; j < k; ++j) scale *= n - j;
-      double* const out = b[k];
+      Real* const out = b[k];
 #pragma GCC unroll 10
-      for (int i = 0; i <= m; ++i) out[i] = scale * row[i];
+      for (int i = 0; i <= m; ++i) out[i] = row[i];
 #pragma GCC unroll 4
       for (int j = m; j < n; ++j) {
         out[j + 1] = out[j];
@@ -51,17 +32,17 @@ NURBS_INLINE void bernstein(int degree, double t, double (&b)[Order + 1][kMaxDeg
       }
     }
     if (m == n) break;
-    double carry = 0.0;
+    Real carry = zero;
 #pragma GCC unroll 10
     for (int i = 0; i <= m; ++i) {
-      const double term = row[i];
+      const Real term = row[i];
       row[i] = carry + s * term;
       carry = t * term;
     }
     row[m + 1] = carry;
   }
   for (int k = n + 1; k <= Order; ++k)
-    for (int i = 0; i <= n; ++i) b[k][i] = 0.0;
+    for (int i = 0; i <= n; ++i) b[k][i] = zero;
 }
 
 constexpr int kJetSize[] = {1, 3, 6, 10};
@@ -71,31 +52,52 @@ constexpr int slot(int a, int b) {
   return (a + b) * (a + b + 1) / 2 + b;
 }
 
+// n!/(n-k)!
+constexpr double falling(int n, int k) {
+  return k == 0 ? 1.0 : n * falling(n - 1, k - 1);
+}
+
 // Homogeneous derivatives of the net at (u, v). P and Q are the degrees, or 0 to take them at run time.
 template <int P, int Q, int Order>
-NURBS_INLINE void homogeneous(const BezierPatch& patch, double u, double v, Lane4* out) {
+NURBS_INLINE void homogeneous(const BezierPatch& patch, double u, double v, Lane4* sum) {
   const int p = P ? P : patch.degree_u;
   const int q = Q ? Q : patch.degree_v;
   double bu[Order + 1][kMaxDegree + 1], bv[Order + 1][kMaxDegree + 1];
-  bernstein<P, Order>(p, u, bu);
-  bernstein<Q, Order>(q, v, bv);
-  Lane4 sum[kJetSize[Order]];
-  for (Lane4& lanes : sum) lanes = Lane4{0, 0, 0, 0};
+  if constexpr (P > 0 && P == Q) {  // both at once
+    Lane2 both[Order + 1][kMaxDegree + 1];
+    bernstein<P, Order>(p, Lane2{u, v}, both);
+#pragma GCC unroll 4
+    for (int k = 0; k <= Order; ++k)
+#pragma GCC unroll 10
+      for (int i = 0; i <= P; ++i) bu[k][i] = both[k][i][0], bv[k][i] = both[k][i][1];
+  } else {
+    bernstein<P, Order>(p, u, bu);
+    bernstein<Q, Order>(q, v, bv);
+  }
   const Vec4* point = patch.points.data();
 #pragma GCC unroll 5
   for (int i = 0; i <= p; ++i) {
     Lane4 row[Order + 1];
-    for (Lane4& lanes : row) lanes = Lane4{0, 0, 0, 0};
 #pragma GCC unroll 5
     for (int j = 0; j <= q; ++j, ++point) {
       Lane4 c;
       load(*point, c);
-      for (int k = 0; k <= Order; ++k) row[k] += bv[k][j] * c;
+#pragma GCC unroll 4
+      for (int k = 0; k <= Order; ++k) row[k] = j == 0 ? bv[k][j] * c : row[k] + bv[k][j] * c;
     }
+#pragma GCC unroll 4
     for (int a = 0; a <= Order; ++a)
-      for (int b = 0; a + b <= Order; ++b) sum[slot(a, b)] += bu[a][i] * row[b];
+#pragma GCC unroll 4
+      for (int b = 0; a + b <= Order; ++b) {
+        Lane4& to = sum[slot(a, b)];
+        to = i == 0 ? bu[a][i] * row[b] : to + bu[a][i] * row[b];
+      }
   }
-  for (int k = 0; k < kJetSize[Order]; ++k) out[k] = sum[k];
+#pragma GCC unroll 4
+  for (int a = 0; a <= Order; ++a)
+#pragma GCC unroll 4
+    for (int b = 0; a + b <= Order; ++b)
+      if (a + b > 0) sum[slot(a, b)] *= falling(p, a) * falling(q, b);
 }
 
 // Quotient rule in place: homogeneous derivatives become derivatives of the Cartesian surface.
@@ -124,8 +126,7 @@ NURBS_INLINE void divide_by_weight(Lane4* a) {
 }
 
 template <int Order>
-NURBS_INLINE void jet(const BezierPatch& patch, double u, double v, Vec3* const* out) {
-  Lane4 a[kJetSize[Order]];
+NURBS_INLINE void jet(const BezierPatch& patch, double u, double v, Lane4* a) {
   const int p = patch.degree_u;
   if (p != patch.degree_v)
     homogeneous<0, 0, Order>(patch, u, v, a);
@@ -140,6 +141,12 @@ NURBS_INLINE void jet(const BezierPatch& patch, double u, double v, Vec3* const*
   else
     homogeneous<0, 0, Order>(patch, u, v, a);
   if (patch.rational) divide_by_weight<Order>(a);
+}
+
+template <int Order>
+NURBS_INLINE void jet(const BezierPatch& patch, double u, double v, Vec3* const* out) {
+  Lane4 a[kJetSize[Order]];
+  jet<Order>(patch, u, v, a);
   for (int k = 0; k < kJetSize[Order]; ++k) to_vec3(a[k], *out[k]);
 }
 
@@ -164,6 +171,17 @@ Jet2 evaluate2(const BezierPatch& patch, double u, double v) {
   Vec3* const out[] = {&j.s, &j.su, &j.sv, &j.suu, &j.suv, &j.svv};
   jet<2>(patch, u, v, out);
   return j;
+}
+
+void evaluate2(const BezierPatch& patch, double u, double v, JetLanes* out) {
+  Lane4 a[8];
+  jet<2>(patch, u, v, a);
+  a[6] = a[7] = Lane4{0, 0, 0, 0};
+  Lane4 low[4], high[4];
+  transpose({a[0], a[1], a[2], a[3]}, low);
+  transpose({a[4], a[5], a[6], a[7]}, high);
+  Lane8* const row[] = {&out->x, &out->y, &out->z};
+  for (int k = 0; k < 3; ++k) join(low[k], high[k], *row[k]);
 }
 
 Jet3 evaluate3(const BezierPatch& patch, double u, double v) {

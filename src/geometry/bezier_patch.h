@@ -3,6 +3,7 @@
 
 #include <vector>
 
+#include "geometry/jet_lanes.h"
 #include "geometry/types.h"
 
 namespace nurbs {
@@ -36,6 +37,7 @@ struct Jet3 {
 Vec3 evaluate0(const BezierPatch& patch, double u, double v);
 Jet1 evaluate1(const BezierPatch& patch, double u, double v);
 Jet2 evaluate2(const BezierPatch& patch, double u, double v);
+void evaluate2(const BezierPatch& patch, double u, double v, JetLanes* out);
 Jet3 evaluate3(const BezierPatch& patch, double u, double v);
 
 }  // namespace nurbs
