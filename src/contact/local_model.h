@@ -60,9 +60,9 @@ struct LocalSupport {
 };
 LocalSupport evaluate_local_support(const SupportModel& model, const Mat3& turn, const Vec3& d);
 
-// The contact now, with bodies turned by `turn_a`, `turn_b` since the reference and B's centre at `offset`
-// from A's.
-LocalContact evaluate_local(const LocalModel& model, const Mat3& turn_a, const Mat3& turn_b,
-                            const Vec3& offset);
+// The contact now: bodies turned from the reference orientations q0 (w x y z) to q, B's centre at `offset` from
+// A's. No surface evaluation; ~50 ns.
+LocalContact evaluate_local(const LocalModel& model, const Quat& q_a, const double* q0_a, const Quat& q_b,
+                            const double* q0_b, const Vec3& offset);
 
 }  // namespace nurbs

@@ -23,6 +23,7 @@ struct PairMemory {
   // Surface points of the last solve, the warm start.
   double patch_a, u_a, v_a;
   double patch_b, u_b, v_b;
+  double step_a[2], step_b[2];  // how far they went from the solve before, in (u, v); 0 across patches
   // Local quadratic model at the reference pose, and the overlap below which its contact is the only one.
   LocalModel model;
   double unique;
@@ -50,14 +51,17 @@ inline void store(const Quat& q, double* to) {
 }
 
 // |q - q0| of unit quaternions is 2 sin(angle / 4); a point at distance R from the centre has moved by
-// 2 R sin(angle / 2) <= 2 R |q - q0|.
-inline double turned(const Quat& q, const double* q0) {
+// 2 R sin(angle / 2) <= 2 R |q - q0|. Here (2 |q - q0|)^2.
+inline double turned2(const Quat& q, const double* q0) {
   const double w = q.w() - q0[0], x = q.x() - q0[1], y = q.y() - q0[2], z = q.z() - q0[3];
-  return 2 * std::sqrt(w * w + x * x + y * y + z * z);
+  return 4 * (w * w + x * x + y * y + z * z);
+}
+inline double turned(const Quat& q, const double* q0) {
+  return std::sqrt(turned2(q, q0));
 }
 
 inline bool finite(const Particle& p) {
-  return p.x.allFinite() && p.q.coeffs().allFinite() && std::isfinite(p.scale) && p.scale > 0;
+  return std::isfinite(p.x.sum() + p.q.coeffs().sum() + p.scale) && p.scale > 0;
 }
 
 inline ContactResult separated(double lower, Rung rung) {

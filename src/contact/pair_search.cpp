@@ -18,59 +18,74 @@ class Ladder {
   Ladder(const Particle& a, const Particle& b, const ContactSettings& settings, PairMemory& memory)
       : a_(a), b_(b), settings_(settings), memory_(memory) {}
 
+  // A pair that touched last time is looked for where it was; any other climbs from the first rung.
+  ContactResult run() {
+    ContactResult r;
+    const bool touched = memory_.known >= 2 && memory_.lower <= settings_.reach;
+    if (!touched && safe(&r)) return r;
+    if (!finite(a_) || !finite(b_)) return r;
+    if (memory_.known >= 3 && local(&r)) return r;
+    const PairFrame pair(a_, b_);
+    if (!touched && bounds(pair, &r)) return r;
+    const double tolerance = std::max(settings_.tolerance * pair.size, kLeastTolerance * pair.reach);
+    if (memory_.known >= 2 && warm(pair, tolerance, &r)) return r;
+    if (touched && bounds(pair, &r)) return r;
+    return cold(pair, tolerance, r.iterations);
+  }
+
+ private:
   // Rung 1, no surface evaluation: spheres, then the budget of the last proof. Let d be the fixed lab
   // direction along which the gap was proven at least `lower` at the reference pose: lower <= d.offset0 -
   // h_A(d) - h_B(-d). Since then the offset has changed by an exactly known vector; no point of K has moved
   // relative to its centre by more than 2 R_K |q_K - q0_K|, so neither has its support. Hence
   //     gap >= lower + d . (offset - offset0) - 2 R_A |q_A - q0_A| - 2 R_B |q_B - q0_B|.
   // Nothing is assumed of how the bodies moved in between.
-  double safe_gap() const {
+  bool safe(ContactResult* r) const {
     const double ra = a_.scale * a_.shape->bounding_radius, rb = b_.scale * b_.shape->bounding_radius;
     const Vec3 offset = b_.x - a_.x;
-    const double spheres2 = offset.squaredNorm(), reach = ra + rb;
-    double gap = spheres2 > reach * reach ? std::sqrt(spheres2) - reach : -reach;
+    constexpr double kSafe = 1 - 8 * kRoundoff;
     if (memory_.known > 0) {
-      const double moved = load(memory_.direction).dot(offset - load(memory_.offset));
-      gap = std::max(gap,
-                     memory_.lower + moved - ra * turned(a_.q, memory_.q_a) - rb * turned(b_.q, memory_.q_b));
-    }
-    return gap * (1 - 4 * kRoundoff);
-  }
-
-  ContactResult run() {
-    const double safe = safe_gap();
-    if (safe > settings_.reach) return separated(safe, Rung::safe);
-    if (!finite(a_) || !finite(b_)) return {};
-    if (memory_.known >= 3) {
-      const double size =
-          std::min(a_.scale * a_.shape->bounding_radius, b_.scale * b_.shape->bounding_radius);
-      if (ContactResult r; local(settings_.tolerance * size, &r)) return r;
-    }
-    const PairFrame pair(a_, b_);
-    if (std::isfinite(settings_.reach)) {
-      // Rung 2: the atlases along the last separating direction, and along the line of centres.
-      Vec3 d = memory_.known > 0 ? Vec3(pair.axes_a.transpose() * load(memory_.direction))
-                                 : pair.offset.normalized();
-      const double lower = -atlas_overlap(pair, d);
-      if (lower > settings_.reach) {
-        remember_pose(pair, d, lower);
-        return separated(lower, Rung::bounds);
+      const double straight = memory_.lower + load(memory_.direction).dot(offset - load(memory_.offset));
+      const double a2 = ra * ra * turned2(a_.q, memory_.q_a), b2 = rb * rb * turned2(b_.q, memory_.q_b);
+      double gap = straight - std::sqrt(2 * (a2 + b2));  // x + y <= sqrt(2 x^2 + 2 y^2)
+      if (!(gap > settings_.reach)) gap = straight - std::sqrt(a2) - std::sqrt(b2);
+      if (gap * kSafe > settings_.reach) {
+        *r = separated(gap * kSafe, Rung::safe);
+        return true;
       }
     }
-    return solve(pair);
+    const double spheres2 = offset.squaredNorm(), reach = ra + rb;
+    if (!(spheres2 > reach * reach)) return false;
+    const double gap = (std::sqrt(spheres2) - reach) * kSafe;
+    if (!(gap > settings_.reach)) return false;
+    *r = separated(gap, Rung::safe);
+    return true;
   }
 
- private:
+  // Rung 2: the atlases along the last separating direction, or along the line of centres.
+  bool bounds(const PairFrame& pair, ContactResult* r) {
+    if (!std::isfinite(settings_.reach)) return false;
+    const Vec3 d = memory_.known > 0 ? Vec3(pair.axes_a.transpose() * load(memory_.direction))
+                                     : pair.offset.normalized();
+    const double lower = -atlas_overlap(pair, d);
+    if (!(lower > settings_.reach)) return false;
+    remember_pose(pair, d, lower);
+    *r = separated(lower, Rung::bounds);
+    return true;
+  }
+
   // Rung 3: the quadratic model of the last solve, while its remainder is below half the tolerance, the
   // contact stays on its patches and shallow enough to be the only one. The model is not renewed: nothing
   // accumulates.
-  bool local(double tolerance, ContactResult* r) const {
+  bool local(ContactResult* r) const {
+    const double size =
+        std::min(a_.scale * a_.shape->bounding_radius, b_.scale * b_.shape->bounding_radius);
+    const double tolerance = settings_.tolerance * size;
     const Vec3 offset = b_.x - a_.x;
-    const LocalContact c =
-        evaluate_local(memory_.model, turn_since(a_.q, memory_.q_a), turn_since(b_.q, memory_.q_b), offset);
+    const LocalContact c = evaluate_local(memory_.model, a_.q, memory_.q_a, b_.q, memory_.q_b, offset);
     if (!c.valid || -c.gap > memory_.unique) return false;
     if (!(c.error <= 0.5 * tolerance && c.drift <= kLocalDrift * tolerance)) return false;
-    const double error = c.error + kRoundoff * offset.norm();
+    const double error = c.error + kRoundoff * offset.lpNorm<1>();
     r->rung = Rung::local_model;
     r->gap = c.gap;
     r->lower = c.gap - error;
@@ -82,22 +97,18 @@ class Ladder {
     return true;
   }
 
-  ContactResult solve(const PairFrame& pair) {
-    const double tolerance = std::max(settings_.tolerance * pair.size, kLeastTolerance * pair.reach);
-    int spent = 0;
-    if (memory_.known >= 2) {
-      const double angle_a = turned(a_.q, memory_.q_a), angle_b = turned(b_.q, memory_.q_b);
-      JointSolution warm = solve_joint(pair, warm_point(memory_.patch_a, memory_.u_a, memory_.v_a, *pair.a),
-                                       warm_point(memory_.patch_b, memory_.u_b, memory_.v_b, *pair.b),
-                                       tolerance, settings_.reach, kWarmIterations);
-      spent += warm.iterations;
-      if (warm.converged || confirm(pair, tolerance, warm)) {
-        const ContactResult r = finish(pair, warm, Rung::warm, spent);
-        if (r.status == Status::converged) remember_model(pair, warm, tolerance, angle_a, angle_b);
-        return r;
-      }
-    }
-    return cold(pair, tolerance, spent);
+  // Rung 4: Newton from where the contact would be, had it moved on as it last did.
+  bool warm(const PairFrame& pair, double tolerance, ContactResult* r) {
+    JointSolution s = solve_joint(
+        pair, warm_point(memory_.patch_a, memory_.u_a, memory_.v_a, memory_.step_a, *pair.a),
+        warm_point(memory_.patch_b, memory_.u_b, memory_.v_b, memory_.step_b, *pair.b), tolerance,
+        settings_.reach, kWarmIterations);
+    r->iterations = s.iterations;
+    if (!s.converged && !confirm(pair, tolerance, s)) return false;
+    const double turned2_a = turned2(a_.q, memory_.q_a), turned2_b = turned2(b_.q, memory_.q_b);
+    *r = finish(pair, s, Rung::warm, s.iterations);
+    if (r->status == Status::converged) remember_model(pair, s, tolerance, turned2_a, turned2_b);
+    return true;
   }
 
   // A common normal of bodies with dents is certified by the hulls' supports along it.
@@ -210,10 +221,12 @@ class Ladder {
     return r;
   }
 
-  static SurfacePoint warm_point(double patch, double u, double v, const Shape& shape) {
+  static SurfacePoint warm_point(double patch, double u, double v, const double* step, const Shape& shape) {
     const int p = static_cast<int>(patch);
     if (p < 0 || p >= static_cast<int>(shape.patches.size())) return {};
-    return {p, u, v};
+    const double on_u = u + step[0], on_v = v + step[1];
+    const bool inside = on_u >= 0 && on_u <= 1 && on_v >= 0 && on_v <= 1;
+    return inside ? SurfacePoint{p, on_u, on_v} : SurfacePoint{p, u, v};
   }
 
   void remember_pose(const PairFrame& pair, const Vec3& d, double lower) {
@@ -226,21 +239,27 @@ class Ladder {
   }
 
   void remember_points(const PointPair& p) {
+    const bool follows = memory_.known >= 2;
     memory_.known = 2;  // drops the model
-    memory_.patch_a = p.on_a.patch;
-    memory_.u_a = p.on_a.u;
-    memory_.v_a = p.on_a.v;
-    memory_.patch_b = p.on_b.patch;
-    memory_.u_b = p.on_b.u;
-    memory_.v_b = p.on_b.v;
+    remember_point(p.on_a, follows, &memory_.patch_a, &memory_.u_a, &memory_.v_a, memory_.step_a);
+    remember_point(p.on_b, follows, &memory_.patch_b, &memory_.u_b, &memory_.v_b, memory_.step_b);
+  }
+  static void remember_point(const SurfacePoint& now, bool follows, double* patch, double* u, double* v,
+                             double* step) {
+    const bool on = follows && *patch == now.patch;
+    step[0] = on ? now.u - *u : 0;
+    step[1] = on ? now.v - *v : 0;
+    *patch = now.patch;
+    *u = now.u;
+    *v = now.v;
   }
 
   // Worth its 50 ns only if bodies that turn as they just did would be served at least once.
-  void remember_model(const PairFrame& pair, const JointSolution& s, double tolerance, double angle_a,
-                      double angle_b) {
+  void remember_model(const PairFrame& pair, const JointSolution& s, double tolerance, double turned2_a,
+                      double turned2_b) {
     const double rate_a = pair.scale_a * pair.a->curvature_rate[s.base_a.patch];
     const double rate_b = pair.scale_b * pair.b->curvature_rate[s.base_b.patch];
-    const double third = rate_a * angle_a * angle_a * angle_a + rate_b * angle_b * angle_b * angle_b;
+    const double third = rate_a * turned2_a * std::sqrt(turned2_a) + rate_b * turned2_b * std::sqrt(turned2_b);
     if (!(kRemainderSafety * third / 6 <= 0.5 * tolerance)) return;
     if (!make_support_model(pair.axes_a, Vec3::Zero(), s.base_a, s.jet_a, rate_a, &memory_.model.a)) return;
     if (!make_support_model(pair.axes_a, pair.offset, s.base_b, s.jet_b, rate_b, &memory_.model.b)) return;

@@ -7,7 +7,7 @@ namespace nurbs {
 
 // Everything a pair remembers, as plain doubles so that it can live in the host's contact history. All zeros
 // is an empty memory. The layout is private to the ladder (pair_memory.h).
-constexpr int kPairMemorySize = 52;
+constexpr int kPairMemorySize = 56;
 
 // Gap, normal and contact points of two particles. Neither throws nor allocates; always returns a bracket.
 // Deterministic: the result depends only on the arguments, and callers pass the particles in tag order.
