@@ -36,13 +36,18 @@ struct Bracket {
 inline double support_excess(const Shape& shape, double scale, const RollingRadii& radii, const Vec3& d,
                              const Vec3& n) {
   const double chord2 = (d - n).squaredNorm();  // 2 (1 - cos), without cancellation
-  const double rolling = 0.5 * radii.outer * chord2;
-  const double wedge = 2 * shape.bounding_radius * std::sqrt(chord2);
-  return scale * ((rolling < wedge ? rolling : wedge) + radii.slack);
+  const double diameter = 2 * shape.bounding_radius;
+  const bool rolls = 0.25 * radii.outer * radii.outer * chord2 < diameter * diameter;
+  return scale * ((rolls ? 0.5 * radii.outer * chord2 : diameter * std::sqrt(chord2)) + radii.slack);
+}
+
+inline RollingRadii radii_at(const Shape& shape, const SurfacePoint& at) {
+  if (!shape.joints.none()) return rolling_radii(shape, at);
+  return {shape.patch_curvature.min_radius, shape.patch_curvature.max_radius, shape.support_excess};
 }
 
 inline Bracket certify(const PairFrame& pair, const PointPair& p) {
-  const RollingRadii radii_a = rolling_radii(*pair.a, p.on_a), radii_b = rolling_radii(*pair.b, p.on_b);
+  const RollingRadii radii_a = radii_at(*pair.a, p.on_a), radii_b = radii_at(*pair.b, p.on_b);
   // A flat part has no largest ball; one as large as the other body's reach does.
   const double rho_a = std::min(pair.scale_a * radii_a.inner, pair.reach);
   const double rho_b = std::min(pair.scale_b * radii_b.inner, pair.reach);

@@ -20,37 +20,43 @@ NURBS_INLINE void evaluate(const PairFrame& pair, const Mat3& frame_b, JointSolu
   place(frame_b, pair.offset, &s.jet_b);
 }
 
-bool invert(const Mat2& m, Mat2* inverse) {
-  const double det = m(0, 0) * m(1, 1) - m(0, 1) * m(1, 0);
-  const double scale = std::abs(m(0, 0) * m(1, 1)) + std::abs(m(0, 1) * m(1, 0));
-  if (!(std::abs(det) > kSingular * scale)) return false;
-  const double r = 1 / det;
-  *inverse << r * m(1, 1), -r * m(0, 1), -r * m(1, 0), r * m(0, 0);
-  return true;
-}
-
-Mat2 symmetric(double a, double b, double c) {
-  Mat2 m;
-  m << a, b, b, c;
-  return m;
-}
+// 2 x 2 matrices as plain numbers, which the compiler keeps in registers.
+struct Symmetric {
+  double a, b, c;  // a b; b c
+  double det() const { return a * c - b * b; }
+  // Determinant too small beside its products to be told from zero.
+  bool singular() const { return !(std::abs(det()) > kSingular * (std::abs(a * c) + b * b)); }
+  Symmetric inverse() const {
+    const double r = 1 / det();
+    return {r * c, -r * b, r * a};
+  }
+};
+struct Square {
+  double a, b, c, d;  // a b; c d
+  Square operator*(const Symmetric& m) const {
+    return {a * m.a + b * m.b, a * m.b + b * m.c, c * m.a + d * m.b, c * m.b + d * m.c};
+  }
+  Square operator*(const Square& m) const {
+    return {a * m.a + b * m.c, a * m.b + b * m.d, c * m.a + d * m.c, c * m.b + d * m.d};
+  }
+};
 
 // The tangents and the fundamental forms of a surface; `along` is the direction the second form is taken in.
 struct Forms {
   Vec3 su, sv;
-  Mat2 first, second;
+  Symmetric first, second;
   Forms(const JetLanes& j, const Vec3& along) : su(j.at(Slot::kSu)), sv(j.at(Slot::kSv)) {
     Lane8 bend;
     dot(j, along, &bend);
-    first = symmetric(su.squaredNorm(), su.dot(sv), sv.squaredNorm());
-    second = symmetric(bend[3], bend[4], bend[5]);
+    first = {su.squaredNorm(), su.dot(sv), sv.squaredNorm()};
+    second = {bend[3], bend[4], bend[5]};
   }
 };
 
 struct Steps {
   Vec2 a, b;
   bool regular;
-  Mat2 metric;  // of A, inverse
+  Symmetric metric;  // of A, inverse
 };
 
 // One Newton system, eliminated by 2 x 2 blocks: the first (metric of A) is regular near any contact, the
@@ -60,22 +66,29 @@ NURBS_INLINE Steps newton_step(const PointPair& p, const JetLanes& ja, const For
   const Vec3 g = p.a - p.b;
   Lane8 with_g;
   dot(ja, g, &with_g);
-  const Vec2 f1(with_g[1], with_g[2]), f2(b.su.dot(p.na), b.sv.dot(p.na));
-  Mat2 t;
-  t << a.su.dot(b.su), a.su.dot(b.sv), a.sv.dot(b.su), a.sv.dot(b.sv);
-  const Mat2 m11 = a.first + symmetric(with_g[3], with_g[4], with_g[5]);
+  const double f1u = with_g[1], f1v = with_g[2], f2u = b.su.dot(p.na), f2v = b.sv.dot(p.na);
+  const Square across{b.su.dot(a.su), b.su.dot(a.sv), b.sv.dot(a.su), b.sv.dot(a.sv)};  // T'
+  const Symmetric m11{a.first.a + with_g[3], a.first.b + with_g[4], a.first.c + with_g[5]};
   Steps steps;
   steps.a.setZero();
   steps.b.setZero();
   steps.regular = false;
-  Mat2 inverse11, inverse_schur;
-  if (!invert(a.first, &steps.metric) || !invert(m11, &inverse11)) return steps;
-  const Mat2 m21 = -(t.transpose() * steps.metric) * a.second;
-  const Mat2 left = m21 * inverse11;
-  if (!invert(b.second + left * t, &inverse_schur)) return steps;
-  steps.b = inverse_schur * (left * f1 - f2);
-  steps.a = inverse11 * (t * steps.b - f1);
-  const double largest = std::max(steps.a.cwiseAbs().maxCoeff(), steps.b.cwiseAbs().maxCoeff());
+  if (a.first.singular() || m11.singular()) return steps;
+  steps.metric = a.first.inverse();
+  const Symmetric inverse = m11.inverse();
+  const Square left = across * steps.metric * a.second * inverse;
+  const Square t{across.a, across.c, across.b, across.d};
+  const Square bent = left * t;  // minus M21 M11^-1 T
+  const Square schur{b.second.a - bent.a, b.second.b - bent.b, b.second.b - bent.c, b.second.c - bent.d};
+  const double det = schur.a * schur.d - schur.b * schur.c;
+  if (!(std::abs(det) > kSingular * (std::abs(schur.a * schur.d) + std::abs(schur.b * schur.c)))) return steps;
+  const double r = -1 / det, ru = left.a * f1u + left.b * f1v + f2u, rv = left.c * f1u + left.d * f1v + f2v;
+  const double bu = r * (schur.d * ru - schur.b * rv), bv = r * (schur.a * rv - schur.c * ru);
+  const double au = t.a * bu + t.b * bv - f1u, av = t.c * bu + t.d * bv - f1v;
+  steps.b = {bu, bv};
+  steps.a = {inverse.a * au + inverse.b * av, inverse.b * au + inverse.c * av};
+  const double largest = std::max(std::max(std::abs(steps.a[0]), std::abs(steps.a[1])),
+                                  std::max(std::abs(bu), std::abs(bv)));
   steps.regular = std::isfinite(largest);
   if (largest > kLargestStep) {
     steps.a *= kLargestStep / largest;
@@ -125,9 +138,9 @@ NURBS_INLINE bool turns_linearly(const JetLanes& j, const Vec2& d) {
 }
 
 // The normal after a step, not normalised: Weingarten's equations.
-NURBS_INLINE Vec3 turned_normal(const Vec3& n, const Forms& f, const Mat2& inverse, const Vec2& d) {
-  const Vec2 turn = inverse * (f.second * d);
-  return n - turn[0] * f.su - turn[1] * f.sv;
+NURBS_INLINE Vec3 turned_normal(const Vec3& n, const Forms& f, const Symmetric& inverse, const Vec2& d) {
+  const double hu = f.second.a * d[0] + f.second.b * d[1], hv = f.second.b * d[0] + f.second.c * d[1];
+  return n - (inverse.a * hu + inverse.b * hv) * f.su - (inverse.b * hu + inverse.c * hv) * f.sv;
 }
 
 // How far the points are from lying on one line along d, squared.
@@ -139,12 +152,10 @@ double misfit2(const Vec3& d, const Vec3& g) {
 NURBS_INLINE bool refine(const PairFrame& pair, JointSolution& s, const Forms& a, const Forms& b,
                          const Steps& steps) {
   PointPair& p = s.points;
-  Mat2 metric_b;
-  if (!turns_linearly(s.jet_a, steps.a) || !turns_linearly(s.jet_b, steps.b) || !invert(b.first, &metric_b))
-    return false;
+  if (!turns_linearly(s.jet_a, steps.a) || !turns_linearly(s.jet_b, steps.b) || b.first.singular()) return false;
   // b.second was taken along A's normal, which is -n_B here up to second order.
-  const Vec3 normal = (turned_normal(p.na, a, steps.metric, steps.a) -
-                       turned_normal(p.nb, b, -metric_b, steps.b))
+  const Vec3 normal = (turned_normal(p.na, a, steps.metric, steps.a) +
+                       turned_normal(-p.nb, b, b.first.inverse(), steps.b))
                           .normalized();
   const Vec3 at_a = taylor(s.jet_a, steps.a[0], steps.a[1]), at_b = taylor(s.jet_b, steps.b[0], steps.b[1]);
   const double noise = kRoundoff * pair.reach;

@@ -28,6 +28,9 @@ struct PairMemory {
   LocalModel model;
   double unique;
   double spare;
+
+  // Whether the last solve could not prove the pair further apart than `reach`.
+  bool touched(double reach) const { return known >= 2 && lower <= reach; }
 };
 static_assert(sizeof(PairMemory) == kPairMemorySize * sizeof(double),
               "the host allots kPairMemorySize doubles");
@@ -64,13 +67,12 @@ inline bool finite(const Particle& p) {
   return std::isfinite(p.x.sum() + p.q.coeffs().sum() + p.scale) && p.scale > 0;
 }
 
-inline ContactResult separated(double lower, Rung rung) {
-  ContactResult r;
-  r.status = Status::separated;
-  r.rung = rung;
-  r.gap = r.lower = lower;
-  r.upper = std::numeric_limits<double>::infinity();
-  return r;
+// Makes a default result one of a pair proven apart.
+inline void set_apart(double lower, Rung rung, ContactResult* r) {
+  r->status = Status::separated;
+  r->rung = rung;
+  r->gap = r->lower = lower;
+  r->upper = std::numeric_limits<double>::infinity();
 }
 
 }  // namespace nurbs

@@ -13,53 +13,56 @@
 namespace nurbs {
 namespace {
 
+bool set_separated(double lower, double reach, Rung rung, ContactResult* r) {
+  if (!(lower > reach)) return false;
+  set_apart(lower, rung, r);
+  return true;
+}
+
+// Rung 1, no surface evaluation: the budget of the last proof, then spheres. Let d be the fixed lab direction
+// along which the gap was proven at least `lower` at the reference pose: lower <= d.offset0 - h_A(d) -
+// h_B(-d). Since then the offset has changed by an exactly known vector; no point of K has moved relative to
+// its centre by more than 2 R_K |q_K - q0_K|, so neither has its support. Hence
+//     gap >= lower + d . (offset - offset0) - 2 R_A |q_A - q0_A| - 2 R_B |q_B - q0_B|.
+// Nothing is assumed of how the bodies moved in between.
+NURBS_INLINE bool safe(const Particle& a, const Particle& b, double enough, const PairMemory& m,
+                       ContactResult* r) {
+  const double ra = a.scale * a.shape->bounding_radius, rb = b.scale * b.shape->bounding_radius;
+  const Vec3 offset = b.x - a.x;
+  constexpr double kSafe = 1 - 8 * kRoundoff;
+  if (m.known > 0) {
+    const double straight = m.lower + load(m.direction).dot(offset - load(m.offset));
+    const double a2 = ra * ra * turned2(a.q, m.q_a), b2 = rb * rb * turned2(b.q, m.q_b);
+    double turned = std::sqrt(2 * (a2 + b2));  // x + y <= sqrt(2 x^2 + 2 y^2)
+    if (!(straight - turned > enough)) turned = std::sqrt(a2) + std::sqrt(b2);
+    if (set_separated((straight - turned) * kSafe, enough, Rung::safe, r)) return true;
+  }
+  const double spheres2 = offset.squaredNorm(), reach = ra + rb;
+  return spheres2 > reach * reach &&
+         set_separated((std::sqrt(spheres2) - reach) * kSafe, enough, Rung::safe, r);
+}
+
 class Ladder {
  public:
   Ladder(const Particle& a, const Particle& b, const ContactSettings& settings, PairMemory& memory)
       : a_(a), b_(b), settings_(settings), memory_(memory) {}
 
-  // A pair that touched last time is looked for where it was; any other climbs from the first rung.
-  ContactResult run() {
-    ContactResult r;
-    const bool touched = memory_.known >= 2 && memory_.lower <= settings_.reach;
-    if (!touched && safe(&r)) return r;
-    if (!finite(a_) || !finite(b_)) return r;
-    if (memory_.known >= 3 && local(&r)) return r;
-    const PairFrame pair(a_, b_);
-    if (!touched && bounds(pair, &r)) return r;
-    const double tolerance = std::max(settings_.tolerance * pair.size, kLeastTolerance * pair.reach);
-    if (memory_.known >= 2 && warm(pair, tolerance, &r)) return r;
-    if (touched && bounds(pair, &r)) return r;
-    return cold(pair, tolerance, r.iterations);
+  // The rungs above the first. A pair that touched last time is looked for where it was.
+  void climb(ContactResult* r) {
+    if (!finite(a_) || !finite(b_)) return;
+    if (memory_.known >= 3 && local(r)) return;
+    solve(r);
   }
 
  private:
-  // Rung 1, no surface evaluation: spheres, then the budget of the last proof. Let d be the fixed lab
-  // direction along which the gap was proven at least `lower` at the reference pose: lower <= d.offset0 -
-  // h_A(d) - h_B(-d). Since then the offset has changed by an exactly known vector; no point of K has moved
-  // relative to its centre by more than 2 R_K |q_K - q0_K|, so neither has its support. Hence
-  //     gap >= lower + d . (offset - offset0) - 2 R_A |q_A - q0_A| - 2 R_B |q_B - q0_B|.
-  // Nothing is assumed of how the bodies moved in between.
-  bool safe(ContactResult* r) const {
-    const double ra = a_.scale * a_.shape->bounding_radius, rb = b_.scale * b_.shape->bounding_radius;
-    const Vec3 offset = b_.x - a_.x;
-    constexpr double kSafe = 1 - 8 * kRoundoff;
-    if (memory_.known > 0) {
-      const double straight = memory_.lower + load(memory_.direction).dot(offset - load(memory_.offset));
-      const double a2 = ra * ra * turned2(a_.q, memory_.q_a), b2 = rb * rb * turned2(b_.q, memory_.q_b);
-      double gap = straight - std::sqrt(2 * (a2 + b2));  // x + y <= sqrt(2 x^2 + 2 y^2)
-      if (!(gap > settings_.reach)) gap = straight - std::sqrt(a2) - std::sqrt(b2);
-      if (gap * kSafe > settings_.reach) {
-        *r = separated(gap * kSafe, Rung::safe);
-        return true;
-      }
-    }
-    const double spheres2 = offset.squaredNorm(), reach = ra + rb;
-    if (!(spheres2 > reach * reach)) return false;
-    const double gap = (std::sqrt(spheres2) - reach) * kSafe;
-    if (!(gap > settings_.reach)) return false;
-    *r = separated(gap, Rung::safe);
-    return true;
+  __attribute__((noinline)) void solve(ContactResult* r) {
+    const bool touched = memory_.touched(settings_.reach);
+    const PairFrame pair(a_, b_);
+    if (!touched && bounds(pair, r)) return;
+    const double tolerance = std::max(settings_.tolerance * pair.size, kLeastTolerance * pair.reach);
+    if (memory_.known >= 2 && warm(pair, tolerance, r)) return;
+    if (touched && bounds(pair, r)) return;
+    *r = cold(pair, tolerance, r->iterations);
   }
 
   // Rung 2: the atlases along the last separating direction, or along the line of centres.
@@ -68,9 +71,8 @@ class Ladder {
     const Vec3 d = memory_.known > 0 ? Vec3(pair.axes_a.transpose() * load(memory_.direction))
                                      : pair.offset.normalized();
     const double lower = -atlas_overlap(pair, d);
-    if (!(lower > settings_.reach)) return false;
+    if (!set_separated(lower, settings_.reach, Rung::bounds, r)) return false;
     remember_pose(pair, d, lower);
-    *r = separated(lower, Rung::bounds);
     return true;
   }
 
@@ -272,7 +274,13 @@ class Ladder {
   PairMemory& memory_;
 };
 
-ContactResult reference_solver(const Particle& a, const Particle& b, const ContactSettings& settings,
+// Out of line: a pair skipped by its budget need not set up what the others use.
+__attribute__((noinline)) void climb(const Particle& a, const Particle& b, const ContactSettings& settings,
+                                     PairMemory& m, ContactResult* r) {
+  Ladder(a, b, settings, m).climb(r);
+}
+
+__attribute__((noinline)) ContactResult reference_solver(const Particle& a, const Particle& b, const ContactSettings& settings,
                                PairMemory& memory) {
   if (!finite(a) || !finite(b)) return {};
   CsoStart start;
@@ -297,8 +305,13 @@ ContactResult reference_solver(const Particle& a, const Particle& b, const Conta
 ContactResult find_contact(const Particle& a, const Particle& b, const ContactSettings& settings,
                            double* memory) {
   PairMemory& m = memory_at(memory);
-  return settings.solver == Solver::cso ? reference_solver(a, b, settings, m)
-                                        : Ladder(a, b, settings, m).run();
+  ContactResult r;
+  if (settings.solver == Solver::cso) {
+    r = reference_solver(a, b, settings, m);
+  } else if (m.touched(settings.reach) || !safe(a, b, settings.reach, m, &r)) {
+    climb(a, b, settings, m, &r);
+  }
+  return r;
 }
 
 }  // namespace nurbs

@@ -32,10 +32,13 @@ ContactResult find_plane_contact(const Particle& particle, const Vec3& origin, c
   // The budget of the last solve, as for a pair (Ladder::safe_gap) with a plane that does not turn.
   if (m.known > 0)
     safe = std::max(safe, m.lower + (height - m.offset[0]) - radius * turned(particle.q, m.q_a));
-  if (safe > settings.reach) return separated(safe, Rung::safe);
-  if (!finite(particle)) return {};
-  const double tolerance = settings.tolerance * radius;
   ContactResult r;
+  if (safe > settings.reach) {
+    set_apart(safe, Rung::safe, &r);
+    return r;
+  }
+  if (!finite(particle)) return r;
+  const double tolerance = settings.tolerance * radius;
   r.normal = normal;
   if (m.known >= 3) {
     const LocalSupport s = evaluate_local_support(m.model.b, turn_since(particle.q, m.q_a), -normal);
@@ -59,7 +62,9 @@ ContactResult find_plane_contact(const Particle& particle, const Vec3& origin, c
     m.offset[0] = height;
     store(particle.q, m.q_a);
     m.lower = lower;
-    return separated(lower, Rung::bounds);
+    r.normal.setZero();
+    set_apart(lower, Rung::bounds, &r);
+    return r;
   }
   const SurfacePoint start{static_cast<int>(m.patch_b), m.u_b, m.v_b};
   const bool warm = m.known >= 2;

@@ -51,7 +51,7 @@ void measure_joint_distance(Shape& shape) {
 RollingRadii rolling_radii(const Shape& shape, const SurfacePoint& at) {
   const JointDistance& joints = shape.joints;
   const CurvatureBounds& patch = shape.patch_curvature;
-  if (joints.convex == 0 && joints.concave == 0)
+  if (joints.none())
     return {patch.min_radius, patch.max_radius, shape.support_excess};
   const std::array<double, 4>& speed = joints.speed[at.patch];
   // 0 * infinity is not a number: an edge at parameter distance 0 that is smooth must not count.

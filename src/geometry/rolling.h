@@ -18,6 +18,7 @@ struct JointDistance {
   double width = 0;    // least width of a patch: no kinked joint beyond a smooth one is nearer than this
   double convex = 0;   // largest kink that opens, rad
   double concave = 0;  // largest kink that closes, rad
+  bool none() const { return convex == 0 && concave == 0; }
 };
 
 // At a surface point x with outward normal n:
