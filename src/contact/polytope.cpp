@@ -61,6 +61,7 @@ class Hull {
  public:
   int vertices = 0, faces = 0;
   bool broken = false;  // by round-off: the faces no longer close
+  double sliver = 0;    // height below which a triangle's normal is round-off; a length
   Vertex vertex[kHullVertices];
   Face face[kHullFaces];
 
@@ -113,9 +114,14 @@ class Hull {
     const Vec3 &p = vertex[a].g, &q = vertex[b].g, &r = vertex[c].g;
     Vec3 m = (q - p).cross(r - p);
     const double length = m.norm();
-    n.normal = length > 0 ? Vec3(m / length) : Vec3::Zero();
-    n.offset = std::min({n.normal.dot(p), n.normal.dot(q), n.normal.dot(r)});
-    if (!(length > 0)) n.offset = kFarAway;  // a sliver: never chosen, seen by nothing
+    const double base2 = std::max({(q - p).squaredNorm(), (r - q).squaredNorm(), (p - r).squaredNorm()});
+    if (length * length > sliver * sliver * base2) {
+      n.normal = m / length;
+      n.offset = std::min({n.normal.dot(p), n.normal.dot(q), n.normal.dot(r)});
+    } else {  // never chosen, seen by nothing
+      n.normal = Vec3::Zero();
+      n.offset = kFarAway;
+    }
     n.alive = true;
   }
 
@@ -188,6 +194,7 @@ class Search {
     shrink_b_ = pair.scale_b * pair.b->curvature.min_radius;
     (shrink_a_ < shrink_b_ ? shrink_a_ : shrink_b_) *= kCoreShare;
     shrink_ = shrink_a_ + shrink_b_;
+    hull_.sliver = kSliver * pair.reach;
   }
 
   // Support pair along unit d as a new vertex; tightens the lower bound of the gap.

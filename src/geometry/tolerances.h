@@ -71,6 +71,8 @@ constexpr int kHullAttempts = 3;    // from other directions, when round-off bro
 constexpr double kHullTurn = 0.2;   // between them
 constexpr double kCoreShare = 0.5;  // of the smaller of the bodies' least curvature radii taken off, the
                                     // other wholly: more would leave two spheres no volume
+constexpr double kSliver = 1e-13;  // triangles of the hull lower than this, relative to the larger body, have
+                                   // no normal of their own
 constexpr double kFarAway = 1e300;  // larger than any length
 
 // --- direction search (cold start)
