@@ -411,7 +411,8 @@ PairCase aligned_faces(Random& random, long) {
   c.a = {cuboid(half_a).shape.get(), 1, Vec3::Zero(), frame};
   c.b = {cuboid(half_b).shape.get(), scale, frame * shift, (frame * turn).normalized()};
   c.truth.gap = apart ? gap : -box_overlap(c, half_a, half_b);
-  if (!apart && c.truth.gap > 0) c.truth.known = Known::bound;  // B hangs over so far that it is past the edge
+  if (!apart && c.truth.gap > 0)
+    c.truth.known = Known::bound;  // B hangs over so far that it is past the edge
   return c;
 }
 
