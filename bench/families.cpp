@@ -275,8 +275,8 @@ Truth oracle_truth(const PairCase& c, const Body& a, const Body& b) {
   Truth truth;
   truth.gap = static_cast<double>(answer.gap);
   truth.normal = answer.normal.cast<double>();
-  truth.has_normal =
-      std::isfinite(answer.runner_up) && answer.gap - answer.runner_up > 1e-6 * std::abs(answer.gap);
+  truth.margin = static_cast<double>(answer.gap - answer.runner_up);
+  truth.has_normal = truth.margin > 1e-6 * std::abs(truth.gap);
   return truth;
 }
 
@@ -727,8 +727,8 @@ Verdict judge(const PairCase& c, const Answer& r, double mesh_error) {
   const double truth = c.truth.known == Known::bound ? std::max(c.truth.gap, along) : c.truth.gap;
   v.error = std::abs(r.gap - truth);
   if (r.gap * truth < 0 && std::min(std::abs(r.gap), std::abs(truth)) > v.allowed) return fail(Failure::sign);
-  if (r.has_normal && c.truth.has_normal && !(r.normal.dot(c.truth.normal) > 0))
-    return fail(Failure::flipped);
+  const bool one_normal = c.truth.has_normal && c.truth.margin > v.allowed;
+  if (r.has_normal && one_normal && !(r.normal.dot(c.truth.normal) > 0)) return fail(Failure::flipped);
   if (mesh_error == 0 && r.has_normal) v.error = std::max(v.error, std::abs(along - r.gap));
   if (!(v.error <= v.allowed)) return fail(Failure::error);
   if (mesh_error > 0) return v;
