@@ -275,8 +275,8 @@ Truth oracle_truth(const PairCase& c, const Body& a, const Body& b) {
   Truth truth;
   truth.gap = static_cast<double>(answer.gap);
   truth.normal = answer.normal.cast<double>();
-  truth.has_normal =
-      std::isfinite(answer.runner_up) && answer.gap - answer.runner_up > 1e-6 * std::abs(answer.gap);
+  truth.margin = static_cast<double>(answer.gap - answer.runner_up);
+  truth.has_normal = truth.margin > 1e-6 * std::abs(truth.gap);
   return truth;
 }
 
@@ -411,7 +411,8 @@ PairCase aligned_faces(Random& random, long) {
   c.a = {cuboid(half_a).shape.get(), 1, Vec3::Zero(), frame};
   c.b = {cuboid(half_b).shape.get(), scale, frame * shift, (frame * turn).normalized()};
   c.truth.gap = apart ? gap : -box_overlap(c, half_a, half_b);
-  if (!apart && c.truth.gap > 0) c.truth.known = Known::bound;  // B hangs over so far that it is past the edge
+  if (!apart && c.truth.gap > 0)
+    c.truth.known = Known::bound;  // B hangs over so far that it is past the edge
   return c;
 }
 
@@ -666,7 +667,7 @@ PairCase dented_pair(Random& random, long) {
 }  // namespace
 
 const std::vector<Family>& all_families() {
-  constexpr long kMany = 100000, kSearched = 1000;
+  constexpr long kMany = 100000, kSearched = 5000;
   static const std::vector<Family> all = {
       {"slender", "slender ellipsoids .05/.07/.15, gaps 1e-9..1e-2 of the size, both signs", kMany, slender},
       {"tiny gap", "gaps 1e-12..1e-7 of the size, both signs, tolerance 1e-13", kMany, tiny_gap},
@@ -675,11 +676,11 @@ const std::vector<Family>& all_families() {
       {"disc on plate", "thin discs on a box's face, flat, tilted by 1e-12..0.1 and on the rim", kMany,
        disc_on_plate},
       {"disc on disc", "thin discs on each other", kMany, disc_on_disc},
-      {"aligned faces", "boxes face to face, tilted by 0..0.1", 20000, aligned_faces},
-      {"parallel boxes", "boxes with parallel axes: faces, edges, corners", 20000, parallel_boxes},
+      {"aligned faces", "boxes face to face, tilted by 0..0.1", kMany, aligned_faces},
+      {"parallel boxes", "boxes with parallel axes: faces, edges, corners", kMany, parallel_boxes},
       {"coaxial", "bodies of revolution on one axis, pole to pole", kMany, coaxial},
-      {"concentric", "one centre, parallel axes: no unique answer", 20000, concentric},
-      {"deep", "ellipsoids overlapping by any amount, down to full containment", 5000, deep},
+      {"concentric", "one centre, parallel axes: no unique answer", kMany, concentric},
+      {"deep", "ellipsoids overlapping by any amount, down to full containment", 20000, deep},
       {"deep general", "pebbles, blocky and kinked bodies, boxes, the same", kSearched, deep_general},
       {"far away", "coordinates 1e5 sizes from the origin", kMany, far_away},
       {"units", "micrometres and kilometres", kMany, units},
@@ -689,8 +690,8 @@ const std::vector<Family>& all_families() {
       {"spinning", "remembered from quite another pose", kMany, spinning},
       {"near planar", "caps of curvature 1e-6 and 1e-4 of the mean", kMany, near_planar},
       {"blocky faces", "fitted flat faces on each other and on plates", kSearched, blocky_faces},
-      {"kinked", "joints open by mrad", 2 * kSearched, kinked_pair},
-      {"dented", "joints dented by 1e-4", 2 * kSearched, dented_pair},
+      {"kinked", "joints open by mrad", kSearched, kinked_pair},
+      {"dented", "joints dented by 1e-4", kSearched, dented_pair},
   };
   return all;
 }
@@ -726,8 +727,8 @@ Verdict judge(const PairCase& c, const Answer& r, double mesh_error) {
   const double truth = c.truth.known == Known::bound ? std::max(c.truth.gap, along) : c.truth.gap;
   v.error = std::abs(r.gap - truth);
   if (r.gap * truth < 0 && std::min(std::abs(r.gap), std::abs(truth)) > v.allowed) return fail(Failure::sign);
-  if (r.has_normal && c.truth.has_normal && !(r.normal.dot(c.truth.normal) > 0))
-    return fail(Failure::flipped);
+  const bool one_normal = c.truth.has_normal && c.truth.margin > v.allowed;
+  if (r.has_normal && one_normal && !(r.normal.dot(c.truth.normal) > 0)) return fail(Failure::flipped);
   if (mesh_error == 0 && r.has_normal) v.error = std::max(v.error, std::abs(along - r.gap));
   if (!(v.error <= v.allowed)) return fail(Failure::error);
   if (mesh_error > 0) return v;

@@ -37,6 +37,8 @@ struct Truth {
   double gap = 0;
   bool has_normal = false;  // whether there is only one right normal
   Vec3 normal = Vec3::Zero();
+  double margin = 1e300;  // by which the next local minimum of p is deeper: a method less exact than that may
+                          // take it for the least
 };
 
 struct PairCase {

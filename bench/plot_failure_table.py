@@ -1,5 +1,6 @@
-#!/usr/bin/env python3
-"""Heat map of bench/results/failure_table.csv: families down, methods across, share of answers that failed."""
+#!/usr/bin/python3
+"""Draws the failure table: plot_failure_table.py failure_table.csv OUT.png
+Heat map, families down, methods across: share of the answers that failed."""
 import csv
 import sys
 
@@ -8,59 +9,65 @@ import matplotlib
 matplotlib.use("Agg")
 import matplotlib.pyplot as plt
 import numpy as np
-from matplotlib.colors import LogNorm
+from matplotlib.colors import LinearSegmentedColormap, LogNorm
 
-LEAST = 1e-5  # shown as the palest colour; zero is white
+LEAST = 1e-5
+NO_FAILURE = "#d9ecd6"
+NAMES = {"ours": "ours", "cso": "the paper's\n(cso)", "libccd": "libccd", "bullet": "Bullet", "fcl": "FCL"}
+SHADES = LinearSegmentedColormap.from_list("failures", ["#fff0cf", "#fdb366", "#e8603c", "#a3162e", "#4d0420"])
 
 
 def read(path):
     with open(path) as f:
-        lines = [line for line in f if not line.startswith("#")]
-    return list(csv.DictReader(lines))
+        machine = f.readline().lstrip("# ").strip()
+        return machine, list(csv.DictReader(f))
 
 
-def label(row):
-    failed, pairs = int(row["failed"]), int(row["pairs"])
-    if failed == 0:
+def heading(method, rows):
+    most = max(int(r["pairs"]) for r in rows if r["method"] == method)
+    name, _, vertices = method.partition("-")
+    return NAMES.get(name, name) + (f"\n{int(vertices):,} vertices" if vertices else "") + f"\n≤ {most:,} pairs"
+
+
+def percent(share):
+    if share == 0:
         return "0"
-    share = failed / pairs
-    return f"{100 * share:.0f}%" if share >= 0.1 else f"{100 * share:.2g}%"
+    return f"{100 * share:.0f} %" if share >= 0.0995 else f"{100 * share:.2g} %"
 
 
 def main(source, target):
-    rows = read(source)
+    machine, rows = read(source)
     families = list(dict.fromkeys(r["family"] for r in rows))
     methods = list(dict.fromkeys(r["method"] for r in rows))
-    cell = {(r["family"], r["method"]): r for r in rows}
     share = np.full((len(families), len(methods)), np.nan)
-    for i, family in enumerate(families):
-        for j, method in enumerate(methods):
-            row = cell.get((family, method))
-            if row and int(row["failed"]):
-                share[i, j] = max(LEAST, int(row["failed"]) / int(row["pairs"]))
-    fig, ax = plt.subplots(figsize=(1.25 * len(methods) + 3.2, 0.36 * len(families) + 1.6))
-    colours = plt.get_cmap("Reds").copy()
-    colours.set_bad("white")
-    image = ax.imshow(share, cmap=colours, norm=LogNorm(LEAST, 1), aspect="auto")
-    for i, family in enumerate(families):
-        for j, method in enumerate(methods):
-            row = cell.get((family, method))
-            if row:
-                dark = share[i, j] > 0.1
-                ax.text(j, i, label(row), ha="center", va="center", fontsize=8, color="white" if dark else "black")
-    pairs = [int(cell[f, methods[0]]["pairs"]) for f in families]
-    ax.set_yticks(range(len(families)), [f"{f}  ({n:,})" for f, n in zip(families, pairs)], fontsize=8)
-    ax.set_xticks(range(len(methods)), methods, fontsize=9)
-    ax.xaxis.tick_top()
-    ax.set_xticks(np.arange(-0.5, len(methods)), minor=True)
-    ax.set_yticks(np.arange(-0.5, len(families)), minor=True)
-    ax.grid(which="minor", color="0.85", linewidth=0.8)
-    ax.tick_params(which="both", length=0)
-    fig.colorbar(image, ax=ax, label="share of answers that failed", shrink=0.8)
-    ax.set_title("Failed answers (pairs judged for the first method)", fontsize=10, pad=24)
-    fig.tight_layout()
-    fig.savefig(target, dpi=150)
+    for r in rows:
+        share[families.index(r["family"]), methods.index(r["method"])] = int(r["failed"]) / int(r["pairs"])
+
+    figure, axes = plt.subplots(figsize=(1.08 * len(methods) + 2.6, 0.31 * len(families) + 1.9))
+    axes.imshow(np.where(share == 0, 1.0, np.nan), cmap=LinearSegmentedColormap.from_list("", [NO_FAILURE] * 2), aspect="auto")
+    shown = np.ma.masked_where(~(share > 0), np.maximum(share, LEAST))
+    image = axes.imshow(shown, cmap=SHADES, norm=LogNorm(LEAST, 1), aspect="auto")
+    for (i, j), value in np.ndenumerate(share):
+        if np.isfinite(value):
+            axes.text(j, i, percent(value), ha="center", va="center", fontsize=8.5, color="white" if value > 0.004 else "#222222",
+                      fontweight="normal" if value else "bold")
+    counts = [max(int(r["pairs"]) for r in rows if r["family"] == f) for f in families]
+    axes.set_yticks(range(len(families)), [f"{f}  ({n:,})" for f, n in zip(families, counts)], fontsize=9)
+    axes.set_xticks(range(len(methods)), [heading(m, rows) for m in methods], fontsize=9)
+    axes.xaxis.tick_top()
+    axes.set_xticks(np.arange(0.5, len(methods) - 1), minor=True)
+    axes.set_yticks(np.arange(0.5, len(families) - 1), minor=True)
+    axes.grid(which="minor", color="white", linewidth=1.5)
+    axes.tick_params(which="both", length=0)
+    for spine in axes.spines.values():
+        spine.set_visible(False)
+    bar = figure.colorbar(image, ax=axes, fraction=0.025, pad=0.02)
+    bar.set_label("share of answers that failed (green: none)", fontsize=9)
+    bar.ax.tick_params(labelsize=8)
+    bar.outline.set_visible(False)
+    axes.set_title(f"Failed answers by family (pairs) and method; {machine}", fontsize=10, pad=12)
+    figure.tight_layout()
+    figure.savefig(target, dpi=110)
 
 
-if __name__ == "__main__":
-    main(*sys.argv[1:3])
+main(*sys.argv[1:3])

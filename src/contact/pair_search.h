@@ -10,6 +10,13 @@ namespace nurbs {
 constexpr int kPairMemorySize = 56;
 
 // Gap, normal and contact points of two particles. Neither throws nor allocates; always returns a bracket.
+//
+// The overlap is the global minimum of p(d) over all directions, however deep. As such it changes by no more
+// than the bodies' relative translation, and under a turn by no more than the way of the outermost point:
+// overlap, size of the force and energy are continuous whatever the bodies do. Where another minimum takes
+// over, normal and contact points jump. Smooth bodies that overlap by less than the sum of their least
+// curvature radii have one minimum only.
+//
 // Deterministic: the result depends only on the arguments, and callers pass the particles in tag order.
 ContactResult find_contact(const Particle& a, const Particle& b, const ContactSettings& settings,
                            double* memory);

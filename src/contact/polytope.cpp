@@ -51,6 +51,7 @@ Vec3 nearest_on_triangle(const Vec3& a, const Vec3& b, const Vec3& c) {
   return {va / sum, vb / sum, vc / sum};
 }
 
+constexpr double kWaves = 37;   // of the joggle across a body, rad
 constexpr double kTie = 1e-14;  // squared distances this close, relatively, are equal
 
 int count_positive(const Vec3& w) {
@@ -61,6 +62,7 @@ class Hull {
  public:
   int vertices = 0, faces = 0;
   bool broken = false;  // by round-off: the faces no longer close
+  double sliver = 0;    // height below which a triangle's normal is round-off; a length
   Vertex vertex[kHullVertices];
   Face face[kHullFaces];
 
@@ -113,9 +115,14 @@ class Hull {
     const Vec3 &p = vertex[a].g, &q = vertex[b].g, &r = vertex[c].g;
     Vec3 m = (q - p).cross(r - p);
     const double length = m.norm();
-    n.normal = length > 0 ? Vec3(m / length) : Vec3::Zero();
-    n.offset = std::min({n.normal.dot(p), n.normal.dot(q), n.normal.dot(r)});
-    if (!(length > 0)) n.offset = kFarAway;  // a sliver: never chosen, seen by nothing
+    const double base2 = std::max({(q - p).squaredNorm(), (r - q).squaredNorm(), (p - r).squaredNorm()});
+    if (length * length > sliver * sliver * base2) {
+      n.normal = m / length;
+      n.offset = std::min({n.normal.dot(p), n.normal.dot(q), n.normal.dot(r)});
+    } else {  // never chosen, seen by nothing
+      n.normal = Vec3::Zero();
+      n.offset = kFarAway;
+    }
     n.alive = true;
   }
 
@@ -183,11 +190,13 @@ class Hull {
 // Everything the search over directions keeps.
 class Search {
  public:
-  Search(const PairFrame& pair, double tolerance) : pair_(pair), tolerance_(tolerance) {
+  Search(const PairFrame& pair, double tolerance, double joggle)
+      : pair_(pair), tolerance_(tolerance), joggle_(joggle) {
     shrink_a_ = pair.scale_a * pair.a->curvature.min_radius;
     shrink_b_ = pair.scale_b * pair.b->curvature.min_radius;
     (shrink_a_ < shrink_b_ ? shrink_a_ : shrink_b_) *= kCoreShare;
     shrink_ = shrink_a_ + shrink_b_;
+    hull_.sliver = kSliver * pair.reach;
   }
 
   // Support pair along unit d as a new vertex; tightens the lower bound of the gap.
@@ -199,6 +208,7 @@ class Search {
     v.a = pair_.place_a(sa.point) - shrink_a_ * d;
     v.b = pair_.place_b(sb.point) + shrink_b_ * d;
     v.g = v.a - v.b;
+    if (joggle_ > 0) v.g += joggle_ * scatter(v.g);
     v.patch_a = sa.where.patch;
     v.u_a = sa.where.u;
     v.v_a = sa.where.v;
@@ -251,7 +261,25 @@ class Search {
     return !hull_.broken;
   }
 
+  // Round a deep minimum the hull's faces have to shrink to the root of the tolerance. Supports along rings
+  // of directions about the seed, each wider than the one inside it, leave the search little else to find.
+  void surround_seed() {
+    if (best_ != 0 || lower_ > -shrink_) return;  // the seed is not the minimum, or the cores are apart
+    const Vec3 d = direction_, t = d.unitOrthogonal(), s = d.cross(t);
+    double phase = 0;
+    for (double angle = std::sqrt(tolerance_ / pair_.size); angle < kWidestRing; angle *= kRingRatio) {
+      for (int k = 0; k < 3; ++k) {
+        const double turn = phase + 2 * M_PI / 3 * k;
+        const int v = query((d + angle * (std::cos(turn) * t + std::sin(turn) * s)).normalized());
+        if (v < 0 || !hull_.grow(v, 0.25 * roundoff())) return;
+      }
+      phase += M_PI / 3;
+    }
+  }
+
   void run(double enough) {
+    surround_seed();
+    if (hull_.broken) return;
     for (int step = 0; step < kHullVertices; ++step) {
       const Vec3 d = next_direction();
       if (upper_ - lower_ <= tolerance_ || lower_ > enough) return;
@@ -287,7 +315,13 @@ class Search {
   }
 
  private:
-  double roundoff() const { return kRoundoff * pair_.reach; }
+  double roundoff() const { return kRoundoff * pair_.reach + 2 * joggle_; }
+
+  // In the unit cube, the same for equal points and in no relation for others.
+  Vec3 scatter(const Vec3& g) const {
+    const Vec3 x = (kWaves / pair_.reach) * g;
+    return Vec3(std::sin(x[1] + 0.7 * x[2]), std::sin(x[2] + 0.6 * x[0]), std::sin(x[0] + 0.8 * x[1]));
+  }
 
   // Direction to ask next, and the upper bound of the gap the hull proves.
   Vec3 next_direction() {
@@ -365,7 +399,7 @@ class Search {
   }
 
   const PairFrame& pair_;
-  double tolerance_;
+  double tolerance_, joggle_;
   double shrink_a_, shrink_b_, shrink_;
   double lower_ = -kFarAway, upper_ = kFarAway;
   Vec3 direction_ = Vec3::UnitX();
@@ -376,18 +410,21 @@ class Search {
 }  // namespace
 
 PolytopeResult solve_polytope(const PairFrame& pair, const Vec3& seed, double tolerance, double enough) {
-  // A hull that round-off broke (coplanar faces) or that stalled is begun again from other directions.
+  // A hull that round-off broke (coplanar faces) or that stalled is begun again from other directions, and
+  // its vertices moved at random by far more than round-off and far less than the tolerance (Barber, Dobkin &
+  // Huhdanpaa 1996, section 4: joggled input); the upper bound allows for it.
   PolytopeResult best;
   Vec3 from = seed;
   for (int attempt = 0; attempt < kHullAttempts; ++attempt) {
-    Search search(pair, tolerance);
+    const double joggle = attempt > 0 ? std::min(kJoggle * pair.reach, 0.05 * tolerance) : 0.0;
+    Search search(pair, tolerance, joggle);
     if (search.start(from)) search.run(enough);
     const PolytopeResult result = search.result();
     const int spent = attempt > 0 ? best.iterations : 0;
     if (attempt == 0 || result.bracket.width() < best.bracket.width()) best = result;
     best.iterations = spent + result.iterations;
     if (best.converged || best.bracket.lower > enough) break;
-    from = best.bracket.direction + kHullTurn * Vec3(0.36, -0.48, 0.8);
+    from = best.bracket.direction + kHullTurn * (attempt + 1) * Vec3(0.36, -0.48, 0.8);
   }
   return best;
 }

@@ -222,7 +222,9 @@ bool find_pole(const Shape& shape, int patch, SurfacePoint* pole) {
 // body, or the slope of the tangent plane times the diameter.
 double excess_of(const Shape& shape, const Vec3& d, const Vec3& n) {
   const double chord2 = (d - n).squaredNorm();
-  return std::min(0.5 * shape.curvature.max_radius * chord2, 2 * shape.bounding_radius * std::sqrt(chord2));
+  const double rolling = 0.5 * shape.curvature.max_radius * chord2;  // NaN on a flat met square
+  const double wedge = 2 * shape.bounding_radius * std::sqrt(chord2);
+  return rolling < wedge ? rolling : wedge;
 }
 
 // Next to a pole normals are lost to round-off. The bound then comes from a surface point a little further

@@ -65,12 +65,17 @@ constexpr double kRoomShare = 0.5;  // of the distance to the patch's edges that
 
 // --- polytope method
 // -------------------------------------------------------------------------------------------
-constexpr int kHullVertices = 512;  // support pairs a fallback may spend; 20 to 80 are usual
-constexpr int kHullFaces = 2048;    // twice the vertices, and room for those being replaced
-constexpr int kHullAttempts = 3;    // from other directions, when round-off broke the hull
-constexpr double kHullTurn = 0.2;   // between them
-constexpr double kCoreShare = 0.5;  // of the smaller of the bodies' least curvature radii taken off, the
-                                    // other wholly: more would leave two spheres no volume
+constexpr int kHullVertices = 512;   // support pairs a fallback may spend; 20 to 80 are usual
+constexpr int kHullFaces = 2048;     // twice the vertices, and room for those being replaced
+constexpr int kHullAttempts = 5;     // from other directions, when round-off broke the hull
+constexpr double kHullTurn = 0.2;    // between them
+constexpr double kCoreShare = 0.5;   // of the smaller of the bodies' least curvature radii taken off, the
+                                     // other wholly: more would leave two spheres no volume
+constexpr double kRingRatio = 4;     // between the rings of directions about a deep minimum
+constexpr double kWidestRing = 0.5;  // rad
+constexpr double kSliver = 1e-13;  // triangles of the hull lower than this, relative to the larger body, have
+                                   // no normal of their own
+constexpr double kJoggle = 1e-11;  // the second hull's vertices move by this, relative to the larger body
 constexpr double kFarAway = 1e300;  // larger than any length
 
 // --- direction search (cold start)

@@ -87,5 +87,16 @@ TEST(Polytope, concentric_bodies_get_a_valid_answer) {
   }
 }
 
+// Turned so that round-off makes needles of coplanar supports, whose normals are anything.
+TEST(Polytope, concentric_boxes_of_one_turn) {
+  Particle a{cuboid().get(), 1, Vec3::Zero(),
+             Quat(-0.83435395672909496, -0.24542780093477598, -0.39674083801244098, -0.29362455086727618)};
+  const Particle b = a;
+  double memory[kPairMemorySize] = {0};
+  const ContactResult r = find_contact(a, b, ContactSettings(), memory);
+  EXPECT_EQ(r.status, Status::converged);
+  EXPECT_NEAR(r.gap, -1.2, 1e-9);
+}
+
 }  // namespace
 }  // namespace nurbs
