@@ -11,11 +11,13 @@
 //   * A lies in the ball of radius P_A that touches at a, so h_A(d) <= d.a + P_A (1 - d.na), likewise B, and
 //         gap >= -p(d) >= d.(b - a) - P_A (1 - d.na) - P_B (1 + d.nb)      for every unit d.
 // With d = (b' - a') / |b' - a'| the bracket is (P_A - rho_A)(1 - d.na) + (P_B - rho_B)(1 + d.nb) wide:
-// quadratic in the angles between the normals and d, and zero for spheres at once.
+// quadratic in the angles between the normals and d, and zero for spheres at once. On bodies with flats or
+// dents the normal map gives a smaller P_K, with no allowance for the dents, that holds near the normal.
 #pragma once
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "contact/pair_frame.h"
 #include "geometry/tolerances.h"
@@ -28,6 +30,7 @@ struct Bracket {
   double angle2;  // larger squared angle between d and a normal: the points' error after a Newton step is of
                   // its order
   double unique;  // rho_A + rho_B: a shallower overlap has no other minimiser
+  bool dented;    // a dent may be near a normal
   double width() const { return upper - lower; }
 };
 
@@ -36,18 +39,24 @@ struct Bracket {
 inline double support_excess(const Shape& shape, double scale, const RollingRadii& radii, const Vec3& d,
                              const Vec3& n) {
   const double chord2 = (d - n).squaredNorm();  // 2 (1 - cos), without cancellation
+  if (chord2 <= kNormalMargin * kNormalMargin && radii.near < kFarAway)
+    return 0.5 * scale * radii.near * chord2;
   const double diameter = 2 * shape.bounding_radius;
   const bool rolls = 0.25 * radii.outer * radii.outer * chord2 < diameter * diameter;
   return scale * ((rolls ? 0.5 * radii.outer * chord2 : diameter * std::sqrt(chord2)) + radii.slack);
 }
 
-inline RollingRadii radii_at(const Shape& shape, const SurfacePoint& at) {
-  if (!shape.joints.none()) return rolling_radii(shape, at);
-  return {shape.patch_curvature.min_radius, shape.patch_curvature.max_radius, shape.support_excess};
+// Radii at a point whose normal is n in axes that `axes` turns the shape's into.
+inline RollingRadii radii_at(const Shape& shape, const SurfacePoint& at, const Mat3* axes, const Vec3& n) {
+  if (shape.joints.none() && shape.normal_map.cells == 0)
+    return {shape.patch_curvature.min_radius, shape.patch_curvature.max_radius, shape.support_excess,
+            std::numeric_limits<double>::infinity()};
+  return rolling_radii(shape, at, axes ? Vec3(axes->transpose() * n) : n);
 }
 
 inline Bracket certify(const PairFrame& pair, const PointPair& p) {
-  const RollingRadii radii_a = radii_at(*pair.a, p.on_a), radii_b = radii_at(*pair.b, p.on_b);
+  const RollingRadii radii_a = radii_at(*pair.a, p.on_a, nullptr, p.na),
+                     radii_b = radii_at(*pair.b, p.on_b, &pair.turn, p.nb);
   // A flat part has no largest ball; one as large as the other body's reach does.
   const double rho_a = std::min(pair.scale_a * radii_a.inner, pair.reach);
   const double rho_b = std::min(pair.scale_b * radii_b.inner, pair.reach);
@@ -62,6 +71,10 @@ inline Bracket certify(const PairFrame& pair, const PointPair& p) {
   const double roundoff = kRoundoff * pair.reach;
   bracket.angle2 = std::max((d - p.na).squaredNorm(), (d + p.nb).squaredNorm());
   bracket.unique = rho_a + rho_b;
+  const auto dented = [](const Shape& shape, const RollingRadii& radii) {
+    return radii.slack > kRoundoff * shape.bounding_radius && !(radii.near < kFarAway);
+  };
+  bracket.dented = dented(*pair.a, radii_a) || dented(*pair.b, radii_b);
   bracket.upper = distance - rho_a - rho_b + roundoff;
   bracket.lower = d.dot(p.b - p.a) - support_excess(*pair.a, pair.scale_a, radii_a, d, p.na) -
                   support_excess(*pair.b, pair.scale_b, radii_b, -d, p.nb) - roundoff;

@@ -81,14 +81,15 @@ NURBS_INLINE Steps newton_step(const PointPair& p, const JetLanes& ja, const For
   const Square bent = left * t;  // minus M21 M11^-1 T
   const Square schur{b.second.a - bent.a, b.second.b - bent.b, b.second.b - bent.c, b.second.c - bent.d};
   const double det = schur.a * schur.d - schur.b * schur.c;
-  if (!(std::abs(det) > kSingular * (std::abs(schur.a * schur.d) + std::abs(schur.b * schur.c)))) return steps;
+  if (!(std::abs(det) > kSingular * (std::abs(schur.a * schur.d) + std::abs(schur.b * schur.c))))
+    return steps;
   const double r = -1 / det, ru = left.a * f1u + left.b * f1v + f2u, rv = left.c * f1u + left.d * f1v + f2v;
   const double bu = r * (schur.d * ru - schur.b * rv), bv = r * (schur.a * rv - schur.c * ru);
   const double au = t.a * bu + t.b * bv - f1u, av = t.c * bu + t.d * bv - f1v;
   steps.b = {bu, bv};
   steps.a = {inverse.a * au + inverse.b * av, inverse.b * au + inverse.c * av};
-  const double largest = std::max(std::max(std::abs(steps.a[0]), std::abs(steps.a[1])),
-                                  std::max(std::abs(bu), std::abs(bv)));
+  const double largest =
+      std::max(std::max(std::abs(steps.a[0]), std::abs(steps.a[1])), std::max(std::abs(bu), std::abs(bv)));
   steps.regular = std::isfinite(largest);
   if (largest > kLargestStep) {
     steps.a *= kLargestStep / largest;
@@ -152,11 +153,12 @@ double misfit2(const Vec3& d, const Vec3& g) {
 NURBS_INLINE bool refine(const PairFrame& pair, JointSolution& s, const Forms& a, const Forms& b,
                          const Steps& steps) {
   PointPair& p = s.points;
-  if (!turns_linearly(s.jet_a, steps.a) || !turns_linearly(s.jet_b, steps.b) || b.first.singular()) return false;
+  if (!turns_linearly(s.jet_a, steps.a) || !turns_linearly(s.jet_b, steps.b) || b.first.singular())
+    return false;
   // b.second was taken along A's normal, which is -n_B here up to second order.
-  const Vec3 normal = (turned_normal(p.na, a, steps.metric, steps.a) +
-                       turned_normal(-p.nb, b, b.first.inverse(), steps.b))
-                          .normalized();
+  const Vec3 normal =
+      (turned_normal(p.na, a, steps.metric, steps.a) + turned_normal(-p.nb, b, b.first.inverse(), steps.b))
+          .normalized();
   const Vec3 at_a = taylor(s.jet_a, steps.a[0], steps.a[1]), at_b = taylor(s.jet_b, steps.b[0], steps.b[1]);
   const double noise = kRoundoff * pair.reach;
   if (!(misfit2(normal, at_b - at_a) <= misfit2(p.na, p.b - p.a) + noise * noise)) return false;
@@ -196,6 +198,7 @@ JointSolution solve_joint(const PairFrame& pair, const SurfacePoint& on_a, const
   PointPair& p = out.points;
   p.on_a = on_a;
   p.on_b = on_b;
+  out.turn = 0;
   const Mat3 frame_b = pair.scale_b * pair.turn;
   for (out.iterations = 1;; ++out.iterations) {
     evaluate(pair, frame_b, out);
@@ -205,6 +208,7 @@ JointSolution solve_joint(const PairFrame& pair, const SurfacePoint& on_a, const
     p.na = na.direction;
     p.nb = nb.direction;
     out.bracket = certify(pair, p);
+    if (!out.bracket.dented) out.turn = kNormalMargin;
     out.converged = close_enough(out.bracket, tolerance, pair.size) || far_enough(out.bracket, enough);
     out.stationary = !out.converged && is_stationary(pair, p);
     const Forms a(out.jet_a, p.na), b(out.jet_b, p.na);

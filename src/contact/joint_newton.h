@@ -12,17 +12,18 @@ struct JointSolution {
   JetLanes jet_a, jet_b;        // ... and the surfaces there, pair frame, lengths of the lab
   Bracket bracket;              // certified, of the pair of points evaluated last
   Vec3 normal;                  // unit, from A towards B
-  double gap;       // normal . (b - a) at the refined points, error O(angle^3), kept inside the bracket
-  int iterations;   // Newton systems solved
-  bool converged;   // bracket no wider than the tolerance asked for, or the gap proven larger than `enough`
+  double gap;      // normal . (b - a) at the refined points, error O(angle^3), kept inside the bracket
+  double turn;     // rad that the normal may turn before another support point takes over, as far as is known
+  int iterations;  // Newton systems solved
+  bool converged;  // bracket no wider than the tolerance asked for, or the gap proven larger than `enough`
   bool stationary;  // a common normal within kStationary, certified or not
 };
 
-// Solves g.A_u = g.A_v = 0, B_u.n_A = B_v.n_A = 0 with g = A - B and A's unit normal n_A, starting from `on_a`,
-// `on_b`; regular at g = 0. Stops as soon as the certificate's bracket is within `tolerance` (a length), then
-// spends the step already solved for on a second-order update of the points. Two second-derivative
-// evaluations an iteration; gives up (converged = false) after `cap` iterations or where the relative
-// curvature is singular.
+// Solves g.A_u = g.A_v = 0, B_u.n_A = B_v.n_A = 0 with g = A - B and A's unit normal n_A, starting from
+// `on_a`, `on_b`; regular at g = 0. Stops as soon as the certificate's bracket is within `tolerance` (a
+// length), then spends the step already solved for on a second-order update of the points. Two
+// second-derivative evaluations an iteration; gives up (converged = false) after `cap` iterations or where
+// the relative curvature is singular.
 JointSolution solve_joint(const PairFrame& pair, const SurfacePoint& on_a, const SurfacePoint& on_b,
                           double tolerance, double enough, int cap);
 

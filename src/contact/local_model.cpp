@@ -103,7 +103,8 @@ bool make_support_model(const Mat3& axes, const Vec3& center, const SurfacePoint
   model->w[2] = r * height * height * l;
   model->rate = rate;
   // Distance along the surface to the patch's edges, exact to first order in the parameters.
-  const double across_u = area / lv * std::min(at.u, 1 - at.u), across_v = area / lu * std::min(at.v, 1 - at.v);
+  const double across_u = area / lv * std::min(at.u, 1 - at.u),
+               across_v = area / lu * std::min(at.v, 1 - at.v);
   model->room = kRoomShare * std::min(across_u, across_v);
   store(axes * (jet.at(Slot::kS) - center), model->arm);
   store(axes * n, model->normal);

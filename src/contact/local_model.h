@@ -60,8 +60,8 @@ struct LocalSupport {
 };
 LocalSupport evaluate_local_support(const SupportModel& model, const Mat3& turn, const Vec3& d);
 
-// The contact now: bodies turned from the reference orientations q0 (w x y z) to q, B's centre at `offset` from
-// A's. No surface evaluation; ~50 ns.
+// The contact now: bodies turned from the reference orientations q0 (w x y z) to q, B's centre at `offset`
+// from A's. No surface evaluation; ~50 ns.
 LocalContact evaluate_local(const LocalModel& model, const Quat& q_a, const double* q0_a, const Quat& q_b,
                             const double* q0_b, const Vec3& offset);
 

@@ -80,8 +80,7 @@ class Ladder {
   // contact stays on its patches and shallow enough to be the only one. The model is not renewed: nothing
   // accumulates.
   bool local(ContactResult* r) const {
-    const double size =
-        std::min(a_.scale * a_.shape->bounding_radius, b_.scale * b_.shape->bounding_radius);
+    const double size = std::min(a_.scale * a_.shape->bounding_radius, b_.scale * b_.shape->bounding_radius);
     const double tolerance = settings_.tolerance * size;
     const Vec3 offset = b_.x - a_.x;
     const LocalContact c = evaluate_local(memory_.model, a_.q, memory_.q_a, b_.q, memory_.q_b, offset);
@@ -101,10 +100,10 @@ class Ladder {
 
   // Rung 4: Newton from where the contact would be, had it moved on as it last did.
   bool warm(const PairFrame& pair, double tolerance, ContactResult* r) {
-    JointSolution s = solve_joint(
-        pair, warm_point(memory_.patch_a, memory_.u_a, memory_.v_a, memory_.step_a, *pair.a),
-        warm_point(memory_.patch_b, memory_.u_b, memory_.v_b, memory_.step_b, *pair.b), tolerance,
-        settings_.reach, kWarmIterations);
+    JointSolution s =
+        solve_joint(pair, warm_point(memory_.patch_a, memory_.u_a, memory_.v_a, memory_.step_a, *pair.a),
+                    warm_point(memory_.patch_b, memory_.u_b, memory_.v_b, memory_.step_b, *pair.b), tolerance,
+                    settings_.reach, kWarmIterations);
     r->iterations = s.iterations;
     if (!s.converged && !confirm(pair, tolerance, s)) return false;
     const double turned2_a = turned2(a_.q, memory_.q_a), turned2_b = turned2(b_.q, memory_.q_b);
@@ -125,6 +124,10 @@ class Ladder {
       s.bracket.lower = -p;
       s.bracket.direction = s.normal;
     }
+    // Two supports differ by at most the diameter times the turn more than they did.
+    const double clear =
+        std::min((a.h - a.rival) / pair.a->bounding_radius, (b.h - b.rival) / pair.b->bounding_radius);
+    s.turn = std::min(0.25 * clear, kNormalMargin);
     s.converged = s.bracket.width() <= tolerance;
     if (s.converged) s.gap = std::clamp(s.gap, s.bracket.lower, s.bracket.upper);
     return s.converged;
@@ -259,12 +262,21 @@ class Ladder {
   // Worth its 50 ns only if bodies that turn as they just did would be served at least once.
   void remember_model(const PairFrame& pair, const JointSolution& s, double tolerance, double turned2_a,
                       double turned2_b) {
+    if (!(s.turn > 0)) return;
     const double rate_a = pair.scale_a * pair.a->curvature_rate[s.base_a.patch];
     const double rate_b = pair.scale_b * pair.b->curvature_rate[s.base_b.patch];
-    const double third = rate_a * turned2_a * std::sqrt(turned2_a) + rate_b * turned2_b * std::sqrt(turned2_b);
+    const double third =
+        rate_a * turned2_a * std::sqrt(turned2_a) + rate_b * turned2_b * std::sqrt(turned2_b);
     if (!(kRemainderSafety * third / 6 <= 0.5 * tolerance)) return;
     if (!make_support_model(pair.axes_a, Vec3::Zero(), s.base_a, s.jet_a, rate_a, &memory_.model.a)) return;
     if (!make_support_model(pair.axes_a, pair.offset, s.base_b, s.jet_b, rate_b, &memory_.model.b)) return;
+    // W (d - n) is at least the least curvature radius times the turn.
+    const auto keep_to = [&](const Shape& shape, double scale, SupportModel& m) {
+      if (shape.normal_map.cells > 0)
+        m.room = std::min(m.room, s.turn * scale * shape.patch_curvature.min_radius);
+    };
+    keep_to(*pair.a, pair.scale_a, memory_.model.a);
+    keep_to(*pair.b, pair.scale_b, memory_.model.b);
     memory_.unique = 0.5 * s.bracket.unique;
     memory_.known = 3;
   }
@@ -280,8 +292,9 @@ __attribute__((noinline)) void climb(const Particle& a, const Particle& b, const
   Ladder(a, b, settings, m).climb(r);
 }
 
-__attribute__((noinline)) ContactResult reference_solver(const Particle& a, const Particle& b, const ContactSettings& settings,
-                               PairMemory& memory) {
+__attribute__((noinline)) ContactResult reference_solver(const Particle& a, const Particle& b,
+                                                         const ContactSettings& settings,
+                                                         PairMemory& memory) {
   if (!finite(a) || !finite(b)) return {};
   CsoStart start;
   start.valid = memory.known >= 2;

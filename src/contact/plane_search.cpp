@@ -11,14 +11,20 @@ namespace nurbs {
 namespace {
 
 // A plane asks one support only; its local model needs no uniqueness, but no dents either.
-void remember_plane_model(const Particle& particle, const Mat3& axes, const Support& support, PairMemory& m) {
+void remember_plane_model(const Particle& particle, const Mat3& axes, const Vec3& d, const Support& support,
+                          PairMemory& m) {
   const Shape& shape = *particle.shape;
-  if (shape.support_excess > kRoundoff * shape.bounding_radius) return;
+  if (shape.support_excess > kRoundoff * shape.bounding_radius && !(shape.normal_map.radius_at(d) < kFarAway))
+    return;
   JetLanes jet;
   evaluate2(shape.patches[support.where.patch], support.where.u, support.where.v, &jet);
   scale(particle.scale, &jet);
   const double rate = particle.scale * shape.curvature_rate[support.where.patch];
-  if (make_support_model(axes, Vec3::Zero(), support.where, jet, rate, &m.model.b)) m.known = 3;
+  if (!make_support_model(axes, Vec3::Zero(), support.where, jet, rate, &m.model.b)) return;
+  if (shape.normal_map.cells > 0)  // as for a pair: no turn that may reach another support point
+    m.model.b.room =
+        std::min(m.model.b.room, kNormalMargin * particle.scale * shape.patch_curvature.min_radius);
+  m.known = 3;
 }
 
 }  // namespace
@@ -85,7 +91,7 @@ ContactResult find_plane_contact(const Particle& particle, const Vec3& origin, c
   m.patch_b = support.where.patch;
   m.u_b = support.where.u;
   m.v_b = support.where.v;
-  if (warm && r.status == Status::converged) remember_plane_model(particle, axes, support, m);
+  if (warm && r.status == Status::converged) remember_plane_model(particle, axes, d, support, m);
   return r;
 }
 

@@ -8,9 +8,9 @@
 namespace nurbs {
 namespace {
 
-// Bernstein polynomials of degree n and their first `Order` derivatives at t, the latter over n!/(n-k)!: b[k][i]
-// is the k-th backward difference of the basis of degree n - k. The basis is raised one degree at a time. N is
-// the degree, or 0 to take it at run time; Real a number, or several side by side.
+// Bernstein polynomials of degree n and their first `Order` derivatives at t, the latter over n!/(n-k)!:
+// b[k][i] is the k-th backward difference of the basis of degree n - k. The basis is raised one degree at a
+// time. N is the degree, or 0 to take it at run time; Real a number, or several side by side.
 template <int N, int Order, class Real>
 NURBS_INLINE void bernstein(int degree, const Real& t, Real (&b)[Order + 1][kMaxDegree + 1]) {
   const int n = N ? N : degree;

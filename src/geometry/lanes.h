@@ -1,5 +1,5 @@
-// Numbers side by side in one register: the compiler's vector types, lowered to whatever the ARCH has. Passed by
-// reference or inlined only, so that no calling convention depends on the ARCH.
+// Numbers side by side in one register: the compiler's vector types, lowered to whatever the ARCH has. Passed
+// by reference or inlined only, so that no calling convention depends on the ARCH.
 #pragma once
 
 #include <cstring>

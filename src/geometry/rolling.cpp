@@ -48,18 +48,18 @@ void measure_joint_distance(Shape& shape) {
   }
 }
 
-RollingRadii rolling_radii(const Shape& shape, const SurfacePoint& at) {
+RollingRadii rolling_radii(const Shape& shape, const SurfacePoint& at, const Vec3& normal) {
   const JointDistance& joints = shape.joints;
   const CurvatureBounds& patch = shape.patch_curvature;
-  if (joints.none())
-    return {patch.min_radius, patch.max_radius, shape.support_excess};
+  const double near = shape.normal_map.cells > 0 ? shape.normal_map.radius_at(normal) : kInfinity;
+  if (joints.none()) return {patch.min_radius, patch.max_radius, shape.support_excess, near};
   const std::array<double, 4>& speed = joints.speed[at.patch];
   // 0 * infinity is not a number: an edge at parameter distance 0 that is smooth must not count.
   double s = joints.width;
   const double parameter[4] = {at.u, 1 - at.u, at.v, 1 - at.v};
   for (int edge = 0; edge < 4; ++edge)
     if (speed[edge] < kInfinity) s = std::min(s, speed[edge] * std::max(0.0, parameter[edge]));
-  RollingRadii radii{0.5 * patch.min_radius, patch.max_radius, shape.support_excess};
+  RollingRadii radii{0.5 * patch.min_radius, patch.max_radius, shape.support_excess, near};
   if (joints.convex > 0) radii.inner = std::min(radii.inner, 0.25 * s / joints.convex);
   if (joints.concave > 0) {
     const bool clear = s >= patch.max_radius * joints.concave;

@@ -23,9 +23,10 @@ struct JointDistance {
 
 // At a surface point x with outward normal n:
 //   a ball of radius `inner` that touches at x lies inside the body;
-//   h(d) <= d.x + outer (1 - d.n) + slack for every unit d.
+//   h(d) <= d.x + outer (1 - d.n) + slack for every unit d;
+//   h(d) <= d.x + near (1 - d.n) for unit d with |d - n| <= kNormalMargin, where `near` is finite.
 struct RollingRadii {
-  double inner, outer, slack;
+  double inner, outer, slack, near;
 };
 
 // Fills shape.joints from links, patches and curvatures.
@@ -36,7 +37,7 @@ void measure_joint_distance(Shape& shape);
 // ball of radius r <= r0/2 drops s^2/(2r) below the tangent plane and the surface at most s^2/(2 r0) + kink
 // (s' - s) beyond the joint, so r <= s/kink suffices; a quarter of that is used, for corners where several
 // joints meet. Likewise a closing kink stays inside the ball of radius 2 P0 once s >= P0 kink; nearer, the
-// surface may rise by shape.support_excess. A few ns.
-RollingRadii rolling_radii(const Shape& shape, const SurfacePoint& at);
+// surface may rise by shape.support_excess. `near` is the normal map's. A few ns.
+RollingRadii rolling_radii(const Shape& shape, const SurfacePoint& at, const Vec3& normal);
 
 }  // namespace nurbs

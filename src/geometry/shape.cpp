@@ -197,6 +197,7 @@ void measure(Draft& draft) {
     s.patch_curvature = {s.bounding_radius, s.bounding_radius};
   s.curvature = add_kinks(s.patch_curvature, kinks);
   measure_joint_distance(s);
+  build_normal_map(s);
   for (const BezierPatch& patch : s.patches) s.curvature_rate.push_back(bound_curvature_rate(patch));
 }
 

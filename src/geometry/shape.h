@@ -12,6 +12,7 @@
 
 #include "geometry/bezier_patch.h"
 #include "geometry/direction_atlas.h"
+#include "geometry/normal_map.h"
 #include "geometry/nurbs_surface.h"
 #include "geometry/rolling.h"
 #include "geometry/types.h"
@@ -65,6 +66,7 @@ struct Shape {
   CurvatureBounds patch_curvature;         // of the patches alone, joints left out
   std::vector<double> curvature_rate;      // per patch, bound of |dW/dn|: curvature_rate.h
   JointDistance joints;                    // to kinked joints: where the patch curvatures hold for the body
+  NormalMap normal_map;                    // local bounds, for bodies with flats or dents
   DirectionAtlas atlas;
 };
 

@@ -315,6 +315,7 @@ Support climb(const Shape& shape, const Vec3& d, SurfacePoint at) {
     }
   }
   best.where = at;
+  best.slope = slope;
   best.point = jet.s;
   best.h = f;
   const double lu = jet.su.squaredNorm(), lv = jet.sv.squaredNorm();
@@ -341,14 +342,26 @@ Support find_support(const Shape& shape, const Vec3& d, const SurfacePoint* star
 
 Support find_hull_support(const Shape& shape, const Vec3& d, const SurfacePoint* start) {
   if (shape.support_excess <= kRoundoff * shape.bounding_radius) return find_support(shape, d, start);
+  // No dent near d: the only point with this normal.
+  const double radius = shape.normal_map.radius_at(d);
+  if (radius < kFarAway) {
+    Support only = find_support(shape, d, start);
+    if (only.converged) {
+      only.upper = only.h + radius * only.slope * only.slope + kRoundoff * shape.bounding_radius;
+      if (only.slope < 0.5 * kNormalMargin) return only;
+    }
+  }
   int nodes[4];
   shape.atlas.cell(d, nodes);
   Support best = find_support(shape, d, start ? start : &shape.atlas.where[nodes[0]]);
   for (const int node : nodes) {
     const Support other = find_support(shape, d, &shape.atlas.where[node]);
     const int iterations = best.iterations + other.iterations;
+    const bool same = (other.point - best.point).norm() <= kSameSupport * shape.bounding_radius;
+    const double rival = same ? best.rival : std::max(best.rival, std::min(best.h, other.h));
     if (other.h > best.h) best = other;
     best.iterations = iterations;
+    best.rival = rival;
   }
   best.upper -= shape.support_excess;
   return best;

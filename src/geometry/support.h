@@ -1,6 +1,8 @@
 // Support mapping of a multi-patch body (paper eq. 4): the point furthest along a direction.
 #pragma once
 
+#include <limits>
+
 #include "geometry/shape.h"
 #include "geometry/types.h"
 
@@ -11,6 +13,8 @@ struct Support {
   Vec3 point = Vec3::Zero();  // shape frame, scale 1
   double h = 0;               // d . point: a lower bound of the support function ...
   double upper = 0;           // ... and a certified upper bound
+  double slope = 1;           // of d . x along the surface at the point, rad
+  double rival = -std::numeric_limits<double>::infinity();  // h of the best other local maximum met
   int iterations = 0;
   bool converged = false;
 };

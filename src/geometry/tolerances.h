@@ -21,12 +21,24 @@ constexpr int kAtlasCells =
     16;  // per cube edge: the bound h is then loose by about (1/16)^2/8 of the curvature radius
 constexpr int kAtlasSamples = 4;  // per patch and direction, to start the first searches from
 
+// --- normal map
+// -------------------------------------------------------------------------------------------
+constexpr int kNormalCells = 64;           // per cube edge: cells 0.01 to 0.03 rad wide
+constexpr double kNormalMargin = 0.01;     // rad around a normal for which the map's promise holds
+constexpr double kLongRadius = 4;          // bounding radii
+constexpr int kNormalQuads = 4;            // per patch parameter, to begin with ...
+constexpr int kNormalDepth = 5;            // ... halved so often where normals spread ...
+constexpr double kNormalQuadAngle = 0.02;  // ... by more than this, rad, or curvature radii ...
+constexpr double kEvenRadius = 1.5;        // ... by more than this factor
+constexpr int kNormalJointSamples = 64;    // along a kinked joint
+
 // --- support mapping
 // -------------------------------------------------------------------------------------------
 constexpr int kSupportIterations = 60;  // 3 to 5 are usual; hops between patches count too
 constexpr int kPolarRestarts = 4;       // times a search may leave a pole
 constexpr double kSlopeTolerance =
     1e-14;  // d . tangent below this is a maximum: excess P slope^2 is far below round-off
+constexpr double kSameSupport = 1e-6;       // points closer than this are one local maximum
 constexpr double kStepTolerance = 1e-13;    // a step shorter than this is round-off
 constexpr double kSufficientAscent = 1e-4;  // share of the gain a step's slope promises that it must bring
 constexpr double kOnEdge = 1e-12;           // a parameter this near 0 or 1 is on the patch's edge
