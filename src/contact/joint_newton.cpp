@@ -98,12 +98,12 @@ NURBS_INLINE Steps newton_step(const PointPair& p, const JetLanes& ja, const For
   return steps;
 }
 
-bool inside(const SurfacePoint& p, const Vec2& d) {
+NURBS_INLINE bool inside(const SurfacePoint& p, const Vec2& d) {
   return p.u + d[0] >= 0 && p.u + d[0] <= 1 && p.v + d[1] >= 0 && p.v + d[1] <= 1;
 }
 
 // Parameters after the step, crossing into neighbours where needed; the common case is no crossing.
-SurfacePoint advance(const Shape& shape, SurfacePoint p, const Vec2& d) {
+NURBS_INLINE SurfacePoint advance(const Shape& shape, SurfacePoint p, const Vec2& d) {
   if (!inside(p, d)) return walk(shape, p, d[0], d[1]);
   p.u += d[0];
   p.v += d[1];
