@@ -53,6 +53,25 @@ inline void store(const Quat& q, double* to) {
   to[3] = q.z();
 }
 
+// Where a surface point would be had it moved on as it last did; if that leaves the patch, where it was.
+inline SurfacePoint warm_point(double patch, double u, double v, const double* step, const Shape& shape) {
+  const int p = static_cast<int>(patch);
+  if (p < 0 || p >= static_cast<int>(shape.patches.size())) return {};
+  const double on_u = u + step[0], on_v = v + step[1];
+  const bool inside = on_u >= 0 && on_u <= 1 && on_v >= 0 && on_v <= 1;
+  return inside ? SurfacePoint{p, on_u, on_v} : SurfacePoint{p, u, v};
+}
+// `follows`: what is stored is the point of the solve before.
+inline void remember_point(const SurfacePoint& now, bool follows, double* patch, double* u, double* v,
+                           double* step) {
+  const bool on = follows && *patch == now.patch;
+  step[0] = on ? now.u - *u : 0;
+  step[1] = on ? now.v - *v : 0;
+  *patch = now.patch;
+  *u = now.u;
+  *v = now.v;
+}
+
 // |q - q0| of unit quaternions is 2 sin(angle / 4); a point at distance R from the centre has moved by
 // 2 R sin(angle / 2) <= 2 R |q - q0|. Here (2 |q - q0|)^2.
 inline double turned2(const Quat& q, const double* q0) {

@@ -226,14 +226,6 @@ class Ladder {
     return r;
   }
 
-  static SurfacePoint warm_point(double patch, double u, double v, const double* step, const Shape& shape) {
-    const int p = static_cast<int>(patch);
-    if (p < 0 || p >= static_cast<int>(shape.patches.size())) return {};
-    const double on_u = u + step[0], on_v = v + step[1];
-    const bool inside = on_u >= 0 && on_u <= 1 && on_v >= 0 && on_v <= 1;
-    return inside ? SurfacePoint{p, on_u, on_v} : SurfacePoint{p, u, v};
-  }
-
   void remember_pose(const PairFrame& pair, const Vec3& d, double lower) {
     memory_.known = std::clamp(memory_.known, 1.0, 2.0);  // a model belongs to the old reference
     store(b_.x - a_.x, memory_.offset);
@@ -248,15 +240,6 @@ class Ladder {
     memory_.known = 2;  // drops the model
     remember_point(p.on_a, follows, &memory_.patch_a, &memory_.u_a, &memory_.v_a, memory_.step_a);
     remember_point(p.on_b, follows, &memory_.patch_b, &memory_.u_b, &memory_.v_b, memory_.step_b);
-  }
-  static void remember_point(const SurfacePoint& now, bool follows, double* patch, double* u, double* v,
-                             double* step) {
-    const bool on = follows && *patch == now.patch;
-    step[0] = on ? now.u - *u : 0;
-    step[1] = on ? now.v - *v : 0;
-    *patch = now.patch;
-    *u = now.u;
-    *v = now.v;
   }
 
   // Worth its 50 ns only if bodies that turn as they just did would be served at least once.

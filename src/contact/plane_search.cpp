@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "contact/certificate.h"
 #include "contact/pair_memory.h"
 #include "contact/pair_search.h"
 #include "geometry/tolerances.h"
@@ -10,89 +11,192 @@
 namespace nurbs {
 namespace {
 
-// A plane asks one support only; its local model needs no uniqueness, but no dents either.
-void remember_plane_model(const Particle& particle, const Mat3& axes, const Vec3& d, const Support& support,
-                          PairMemory& m) {
-  const Shape& shape = *particle.shape;
-  if (shape.support_excess > kRoundoff * shape.bounding_radius && !(shape.normal_map.radius_at(d) < kFarAway))
-    return;
-  JetLanes jet;
-  evaluate2(shape.patches[support.where.patch], support.where.u, support.where.v, &jet);
-  scale(particle.scale, &jet);
-  const double rate = particle.scale * shape.curvature_rate[support.where.patch];
-  if (!make_support_model(axes, Vec3::Zero(), support.where, jet, rate, &m.model.b)) return;
-  if (shape.normal_map.cells > 0)  // as for a pair: no turn that may reach another support point
-    m.model.b.room =
-        std::min(m.model.b.room, kNormalMargin * particle.scale * shape.patch_curvature.min_radius);
-  m.known = 3;
+// A support point with the surface around it, shape frame, scale 1.
+struct WarmSupport {
+  Support support;
+  SurfacePoint base;  // the parameters evaluated last
+  JetLanes jet;       // the surface there
+};
+
+// Newton for the support in direction d from `at`, usually one evaluation: certified by the ball that rolls
+// around the body, then moved on by the step already solved for. False where it leaves the patch, meets a
+// pole or vanishing curvature, or needs more than kWarmIterations.
+bool solve_warm(const Shape& shape, const Vec3& d, SurfacePoint at, double tolerance, WarmSupport* out) {
+  using Slot = JetLanes::Slot;
+  for (int k = 1; k <= kWarmIterations; ++k) {
+    evaluate2(shape.patches[at.patch], at.u, at.v, &out->jet);
+    const JetLanes& j = out->jet;
+    const Vec3 su = j.at(Slot::kSu), sv = j.at(Slot::kSv), cross = su.cross(sv);
+    const double lu = su.squaredNorm(), lv = sv.squaredNorm();
+    if (std::min(lu, lv) < kNearPole * kNearPole * std::max(lu, lv)) return false;
+    const Vec3 n = cross.normalized();
+    Lane8 f;
+    dot(j, d, &f);
+    const double det = f[3] * f[5] - f[4] * f[4];
+    if (!(f[3] < 0 && det > kSingular * f[3] * f[5])) return false;
+    const double r = 1 / det, du = r * (f[4] * f[2] - f[5] * f[1]), dv = r * (f[4] * f[1] - f[3] * f[2]);
+    const double u = at.u + du, v = at.v + dv;
+    if (!(u >= 0 && u <= 1 && v >= 0 && v <= 1)) return false;
+    const double excess = support_excess(shape, 1, radii_at(shape, at, nullptr, n), d, n);
+    const double roundoff = kRoundoff * shape.bounding_radius;
+    if (excess <= tolerance &&
+        (d - n).squaredNorm() * shape.bounding_radius <= std::max(tolerance, roundoff)) {
+      Support& s = out->support;
+      out->base = at;
+      s.where = {at.patch, u, v};
+      s.point = taylor(j, du, dv);
+      s.h = d.dot(s.point);
+      s.upper = f[0] + excess + roundoff;
+      s.iterations = k;
+      s.converged = s.h >= f[0] - roundoff && s.h <= s.upper;
+      return s.converged;
+    }
+    at.u = u;
+    at.v = v;
+  }
+  return false;
 }
+
+class PlaneLadder {
+ public:
+  PlaneLadder(const Particle& particle, double height, const Vec3& normal, const ContactSettings& settings,
+              PairMemory& memory)
+      : particle_(particle),
+        shape_(*particle.shape),
+        radius_(particle.scale * shape_.bounding_radius),
+        height_(height),
+        normal_(normal),
+        settings_(settings),
+        tolerance_(settings.tolerance * radius_),
+        memory_(memory) {}
+
+  ContactResult run() {
+    ContactResult r;
+    const bool touched = memory_.touched(settings_.reach);
+    if (!touched && safe(&r)) return r;
+    if (!finite(particle_)) return r;
+    if (memory_.known >= 3 && local(&r)) return r;
+    axes_ = particle_.q.toRotationMatrix();
+    d_ = axes_.transpose() * -normal_;
+    if (!touched && bounds(&r)) return r;
+    if (memory_.known >= 2 && warm(&r)) return r;
+    if (touched && bounds(&r)) return r;
+    search(&r);
+    return r;
+  }
+
+ private:
+  // The budget of the last solve, as for a pair, with a plane that does not turn.
+  bool safe(ContactResult* r) const {
+    double gap = height_ - radius_;
+    if (memory_.known > 0)
+      gap = std::max(
+          gap, memory_.lower + (height_ - memory_.offset[0]) - radius_ * turned(particle_.q, memory_.q_a));
+    if (!(gap > settings_.reach)) return false;
+    set_apart(gap, Rung::safe, r);
+    return true;
+  }
+
+  bool local(ContactResult* r) const {
+    const LocalSupport s =
+        evaluate_local_support(memory_.model.b, turn_since(particle_.q, memory_.q_a), -normal_);
+    if (!(s.valid && s.error <= 0.5 * tolerance_ && s.drift <= kLocalDrift * tolerance_)) return false;
+    const double error = s.error + kRoundoff * radius_;
+    r->rung = Rung::local_model;
+    set_contact(s.h, s.h - error, s.h + error, s.point, r);
+    return true;
+  }
+
+  bool bounds(ContactResult* r) {
+    const double lower = height_ - particle_.scale * shape_.atlas.support_upper(d_);
+    if (!(lower > settings_.reach)) return false;
+    memory_.known = std::clamp(memory_.known, 1.0, 2.0);
+    remember_pose(lower);
+    set_apart(lower, Rung::bounds, r);
+    return true;
+  }
+
+  bool warm(ContactResult* r) {
+    WarmSupport s;
+    const SurfacePoint start = warm_point(memory_.patch_b, memory_.u_b, memory_.v_b, memory_.step_b, shape_);
+    if (!solve_warm(shape_, d_, start, settings_.tolerance * shape_.bounding_radius, &s)) return false;
+    r->rung = Rung::warm;
+    const double turned2_before = turned2(particle_.q, memory_.q_a);
+    finish(s.support, r);
+    if (r->status == Status::converged) remember_model(s, turned2_before);
+    return true;
+  }
+
+  // The support mapping at large: across patches, from the last point or the atlas.
+  void search(ContactResult* r) {
+    const bool warm = memory_.known >= 2;
+    const SurfacePoint start{static_cast<int>(memory_.patch_b), memory_.u_b, memory_.v_b};
+    r->rung = warm ? Rung::warm : Rung::cold;
+    finish(find_hull_support(shape_, d_, warm ? &start : nullptr), r);
+  }
+
+  void finish(const Support& s, ContactResult* r) {
+    r->iterations = s.iterations;
+    const double scale = particle_.scale;
+    set_contact(scale * s.h, scale * s.h, scale * s.upper, axes_ * (scale * s.point), r);
+    const bool follows = memory_.known >= 2;
+    memory_.known = 2;
+    remember_pose(r->lower);
+    remember_point(s.where, follows, &memory_.patch_b, &memory_.u_b, &memory_.v_b, memory_.step_b);
+  }
+
+  // From the support along the plane's normal, its bounds and its point.
+  void set_contact(double h, double h_lower, double h_upper, const Vec3& point, ContactResult* r) const {
+    r->normal = normal_;
+    r->gap = height_ - h;
+    r->lower = height_ - h_upper;
+    r->upper = height_ - h_lower;
+    r->point_b = point;
+    r->point_a = point - r->gap * normal_;
+    r->status = r->lower > settings_.reach          ? Status::separated
+                : r->upper - r->lower <= tolerance_ ? Status::converged
+                                                    : Status::unresolved;
+  }
+
+  void remember_pose(double lower) {
+    memory_.offset[0] = height_;
+    store(particle_.q, memory_.q_a);
+    memory_.lower = lower;
+  }
+
+  // Worth it only if a body that turns as it just did would be served at least once. A plane asks one support
+  // only: the model needs no uniqueness, but no dents near either.
+  void remember_model(const WarmSupport& s, double turned2_before) {
+    const double rate = particle_.scale * shape_.curvature_rate[s.base.patch];
+    const double third = rate * turned2_before * std::sqrt(turned2_before);
+    if (!(kRemainderSafety * third / 6 <= 0.5 * tolerance_)) return;
+    const bool dented = shape_.support_excess > kRoundoff * shape_.bounding_radius;
+    if (dented && !(shape_.normal_map.radius_at(d_) < kFarAway)) return;
+    JetLanes jet = s.jet;
+    scale(particle_.scale, &jet);
+    SupportModel& model = memory_.model.b;
+    if (!make_support_model(axes_, Vec3::Zero(), s.base, jet, rate, &model)) return;
+    if (shape_.normal_map.cells > 0)  // no turn that may reach another support point
+      model.room = std::min(model.room, kNormalMargin * particle_.scale * shape_.patch_curvature.min_radius);
+    memory_.known = 3;
+  }
+
+  const Particle& particle_;
+  const Shape& shape_;
+  const double radius_, height_;  // of the centre above the plane
+  const Vec3& normal_;
+  const ContactSettings& settings_;
+  const double tolerance_;
+  PairMemory& memory_;
+  Mat3 axes_;
+  Vec3 d_;  // towards the plane, shape axes
+};
 
 }  // namespace
 
 ContactResult find_plane_contact(const Particle& particle, const Vec3& origin, const Vec3& normal,
                                  const ContactSettings& settings, double* memory) {
-  PairMemory& m = memory_at(memory);
-  const double radius = particle.scale * particle.shape->bounding_radius;
-  const double height = normal.dot(particle.x - origin);
-  double safe = height - radius;
-  // The budget of the last solve, as for a pair (Ladder::safe_gap) with a plane that does not turn.
-  if (m.known > 0)
-    safe = std::max(safe, m.lower + (height - m.offset[0]) - radius * turned(particle.q, m.q_a));
-  ContactResult r;
-  if (safe > settings.reach) {
-    set_apart(safe, Rung::safe, &r);
-    return r;
-  }
-  if (!finite(particle)) return r;
-  const double tolerance = settings.tolerance * radius;
-  r.normal = normal;
-  if (m.known >= 3) {
-    const LocalSupport s = evaluate_local_support(m.model.b, turn_since(particle.q, m.q_a), -normal);
-    if (s.valid && s.error <= 0.5 * tolerance && s.drift <= kLocalDrift * tolerance) {
-      r.rung = Rung::local_model;
-      r.gap = height - s.h;
-      const double error = s.error + kRoundoff * radius;
-      r.lower = r.gap - error;
-      r.upper = r.gap + error;
-      r.point_b = s.point;
-      r.point_a = r.point_b - r.gap * normal;
-      r.status = r.lower > settings.reach ? Status::separated : Status::converged;
-      return r;
-    }
-  }
-  const Mat3 axes = particle.q.toRotationMatrix();
-  const Vec3 d = axes.transpose() * -normal;
-  if (const double lower = height - particle.scale * particle.shape->atlas.support_upper(d);
-      lower > settings.reach) {
-    m.known = std::clamp(m.known, 1.0, 2.0);
-    m.offset[0] = height;
-    store(particle.q, m.q_a);
-    m.lower = lower;
-    r.normal.setZero();
-    set_apart(lower, Rung::bounds, &r);
-    return r;
-  }
-  const SurfacePoint start{static_cast<int>(m.patch_b), m.u_b, m.v_b};
-  const bool warm = m.known >= 2;
-  const Support support = find_hull_support(*particle.shape, d, warm ? &start : nullptr);
-  r.rung = warm ? Rung::warm : Rung::cold;
-  r.iterations = support.iterations;
-  r.gap = r.upper = height - particle.scale * support.h;
-  r.lower = height - particle.scale * support.upper;
-  r.point_b = axes * (particle.scale * support.point);
-  r.point_a = r.point_b - r.gap * normal;
-  r.status = r.lower > settings.reach         ? Status::separated
-             : r.upper - r.lower <= tolerance ? Status::converged
-                                              : Status::unresolved;
-  m.known = 2;
-  m.offset[0] = height;
-  store(particle.q, m.q_a);
-  m.lower = r.lower;
-  m.patch_b = support.where.patch;
-  m.u_b = support.where.u;
-  m.v_b = support.where.v;
-  if (warm && r.status == Status::converged) remember_plane_model(particle, axes, d, support, m);
-  return r;
+  return PlaneLadder(particle, normal.dot(particle.x - origin), normal, settings, memory_at(memory)).run();
 }
 
 }  // namespace nurbs
