@@ -135,7 +135,8 @@ void run_rung(benchmark::State& state, Rehearsed& r, Rung rung) {
   }
 }
 
-// Apart by a few per cent, proven so a step ago, and not by the bounding spheres, which the host looks at first.
+// Apart by a few per cent, proven so a step ago, and not by the bounding spheres, which the host looks at
+// first.
 void budget(benchmark::State& state, int which) {
   Rehearsed r;
   for (const auto& path : scene(which).paths) {
@@ -225,6 +226,31 @@ void turning(benchmark::State& state, int which, Solver solver) {
   if (solver == Solver::ours) state.counters["warm share"] = static_cast<double>(warm) / all;
 }
 
+// A body that turns `turn` rad a step, half sunk into a plane. One iteration is one whole path.
+void plane(benchmark::State& state, int which, double turn) {
+  const Scene& s = scene(which);
+  const ContactSettings settings = host_settings();
+  Random random(9);
+  const Quat step(Eigen::AngleAxisd(turn, random.direction()));
+  double memory[kPairMemorySize];
+  size_t k = 0;
+  for (auto _ : state) {
+    std::vector<Particle> path{s.paths[k][0].a};
+    if (++k == s.paths.size()) k = 0;
+    while (path.size() < kSteps) {
+      path.push_back(path.back());
+      path.back().q = (step * path.back().q).normalized();
+    }
+    std::memset(memory, 0, sizeof memory);
+    const Vec3 up(0, 0, 1), origin(0, 0, path[0].x[2]);
+    for (int i = 0; i < 2; ++i) find_plane_contact(path[i], origin, up, settings, memory);
+    const double start = thread_seconds();
+    for (int i = 2; i < kSteps; ++i)
+      benchmark::DoNotOptimize(find_plane_contact(path[i], origin, up, settings, memory).gap);
+    state.SetIterationTime(std::max(1e-9, (thread_seconds() - start - clock_cost())) / (kSteps - 2));
+  }
+}
+
 void cold(benchmark::State& state, int which, Solver solver) {
   const Scene& s = scene(which);
   ContactSettings settings = host_settings();
@@ -269,7 +295,8 @@ class Collector : public benchmark::BenchmarkReporter {
         continue;
       }
       Row& row = find(name);
-      const bool manual = name.find("/turning") != std::string::npos;
+      const bool manual =
+          name.find("/turning") != std::string::npos || name.find("/plane") != std::string::npos;
       row.ns.push_back(manual ? run.GetAdjustedRealTime() : run.GetAdjustedCPUTime());
       for (const auto& c : run.counters) row.counters[c.first] = c.second;
     }
@@ -307,6 +334,12 @@ std::vector<std::string> register_all() {
         ->UseManualTime()
         ->Iterations(kPaths);
     add("turning 2e-3 cso", [=](benchmark::State& s) { turning(s, which, Solver::cso); })
+        ->UseManualTime()
+        ->Iterations(kPaths);
+    add("plane, turning 2e-3", [=](benchmark::State& s) { plane(s, which, kTurn); })
+        ->UseManualTime()
+        ->Iterations(kPaths);
+    add("plane, resting", [=](benchmark::State& s) { plane(s, which, kRest); })
         ->UseManualTime()
         ->Iterations(kPaths);
     add("cold", [=](benchmark::State& s) { cold(s, which, Solver::ours); });

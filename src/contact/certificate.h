@@ -30,7 +30,7 @@ struct Bracket {
   double angle2;  // larger squared angle between d and a normal: the points' error after a Newton step is of
                   // its order
   double unique;  // rho_A + rho_B: a shallower overlap has no other minimiser
-  bool dented;    // a dent may be near a normal
+  bool dented = true;  // a dent may be near a normal
   double width() const { return upper - lower; }
 };
 
