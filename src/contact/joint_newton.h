@@ -15,8 +15,9 @@ struct JointSolution {
   double gap;      // normal . (b - a) at the refined points, error O(angle^3), kept inside the bracket
   double turn;     // rad that the normal may turn before another support point takes over, as far as is known
   int iterations;  // Newton systems solved
-  bool converged;  // bracket no wider than the tolerance asked for, or the gap proven larger than `enough`
-  bool stationary;  // a common normal within kStationary, certified or not
+  bool converged =
+      false;  // bracket no wider than the tolerance asked for, or the gap proven larger than `enough`
+  bool stationary = false;  // a common normal within kStationary, certified or not
 };
 
 // Solves g.A_u = g.A_v = 0, B_u.n_A = B_v.n_A = 0 with g = A - B and A's unit normal n_A, starting from
