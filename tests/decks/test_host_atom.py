@@ -321,6 +321,19 @@ class BadInput(unittest.TestCase):
                                   ("compute c all nurbs/atom q", "q must be one of")):
             self.refuse(HEADER + "read_data in.data\n" + command + "\n", expected, files=files())
 
+    def test_insertion_of_spheres(self):
+        """Insert fixes are refused before they insert; their templates are harmless."""
+        templates = ("fix t all particletemplate/sphere 15485863 atom_type 1 density constant 2500 radius constant 0.5\n"
+                     "fix d all particledistribution/discrete 32452843 1 t 1.0\n")
+        text = HEADER + "read_data in.data\natom_modify sort 0 0\n" + templates + "fix m all nve/nurbs\n"
+        region = "region r block -1 1 -1 1 6 9 units box\n"
+        for kind, options in (("pack", "insert_every once all_in yes particles_in_region 1 region r"),
+                              ("rate/region", "nparticles 1 particlerate 100 insert_every 10 all_in yes region r")):
+            insert = f"fix i all insert/{kind} seed 86028121 distributiontemplate d {options}\n"
+            self.refuse(text + region + insert + "run 10\n", f"Fix insert/{kind} ", "read_data", "create_atoms",
+                        on=(1, 2), files=files())
+        deck.run_ok(text + "run 1\n", files=files())
+
     def test_set_command_spoils_a_particle(self):
         self.refuse(HEADER + "read_data in.data\nset atom 2 diameter 0\nfix m all nve/nurbs\nrun 0\n", "Atom 2", "scale 0",
                     files=files())
