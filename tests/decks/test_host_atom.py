@@ -286,6 +286,13 @@ class BadInput(unittest.TestCase):
     def test_atom_style_without_files(self):
         self.refuse("units si\natom_style nurbs\n", "at least one shape file")
 
+    def test_errors_of_the_host_reach_a_pipe(self):
+        """Those of one rank end the program without a flush."""
+        for ranks in (1, 2):
+            run = deck.run("units si\ninclude absent.in\n", ranks=ranks)
+            self.assertNotEqual(run.status, 0)
+            self.assertTrue(any("Cannot open input script absent.in" in line for line in run.errors), run.screen)
+
     def test_missing_file(self):
         self.refuse("units si\natom_style nurbs brick.json absent.json\n", "absent.json", on=(1, 2, 4), files=SHAPES)
 
