@@ -57,6 +57,7 @@ class FixWallNurbs : public Fix {
   void parse_plane(int narg, char** arg);
   void compute_particle(int i);
   void apply(int i, const nurbs::ContactState& state);
+  void warn_periodic();
   void warn_time_step();
 
   nurbs::Vec3 origin_ = nurbs::Vec3::Zero(), normal_ = nurbs::Vec3::UnitZ();
@@ -69,6 +70,7 @@ class FixWallNurbs : public Fix {
   nurbs::EnergyLedger stored_, dissipated_;
   nurbs_host::ContactCounts counts_;
   nurbs::Vec3 force_ = nurbs::Vec3::Zero(), torque_ = nurbs::Vec3::Zero();  // on the wall, this rank's share
+  bool periodic_warned_ = false;
   std::string last_warning_;
 };
 

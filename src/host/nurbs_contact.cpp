@@ -5,6 +5,7 @@
 #include <cstdlib>
 
 #include "atom.h"
+#include "domain.h"
 #include "host/host_error.h"
 
 namespace LAMMPS_NS::nurbs_host {
@@ -99,6 +100,12 @@ BodyMotion motion_of(const AtomVecNurbs& bodies, const Atom& atom, int i, double
   const nurbs::Quat axes = nurbs::Quat(q[0], q[1], q[2], q[3]) * bodies.shape(i)->principal_axes;
   return nurbs::body_motion(velocity, spin, atom.rmass[i], bodies.principal_inertia(i),
                             axes.toRotationMatrix(), dt);
+}
+
+Vec3 box_edge(const Domain& domain, int k) {
+  if (k == 0) return {domain.xprd, 0, 0};
+  if (k == 1) return {domain.triclinic ? domain.xy : 0, domain.yprd, 0};
+  return {domain.triclinic ? domain.xz : 0, domain.triclinic ? domain.yz : 0, domain.zprd};
 }
 
 void ContactCounts::add_safe(double weight) {

@@ -44,6 +44,9 @@ double parse_not_negative(LAMMPS* lmp, const std::string& what, const char* text
 nurbs::BodyMotion motion_of(const AtomVecNurbs& bodies, const class Atom& atom, int i, double dt,
                             int freeze_groupbit);
 
+// Edge k of the box as a vector.
+nurbs::Vec3 box_edge(const class Domain& domain, int k);
+
 // Settings of the host: a pair proven apart needs no more.
 inline nurbs::ContactSettings contacts_only() {
   nurbs::ContactSettings settings;

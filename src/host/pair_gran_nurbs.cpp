@@ -152,7 +152,25 @@ void PairGranNurbs::init_style() {
   history_fix_ = dynamic_cast<FixContactHistoryNurbs*>(fix_history);
   if (history_fix_ == nullptr)
     fail_all(FLERR, lmp, "Pair gran/nurbs: fix contacthistory is not the NURBS one");
+  warn_short_box();
   warn_time_step();
+}
+
+// Two particles can touch twice, across a short periodic edge, but have one history.
+void PairGranNurbs::warn_short_box() {
+  double mine = 0, largest = 0;
+  for (int i = 0; i < atom->nlocal; ++i) mine = std::max(mine, atom->radius[i]);
+  MPI_Allreduce(&mine, &largest, 1, MPI_DOUBLE, MPI_MAX, world);
+  for (int k = 0; k < 3 && !short_box_warned_; ++k) {
+    const double length = nurbs_host::box_edge(*domain, k).norm();
+    if (!domain->periodicity[k] || length >= 4 * largest) continue;
+    short_box_warned_ = true;
+    nurbs_host::warn(FLERR, lmp,
+                     std::string("Pair gran/nurbs: the periodic box is ") + nurbs_host::show(length) +
+                         " long in " + "xyz"[k] + "; two largest bounding diameters, " +
+                         nurbs_host::show(4 * largest) +
+                         ", are needed, or two particles that touch twice share one contact history");
+  }
 }
 
 void PairGranNurbs::reset_dt() {

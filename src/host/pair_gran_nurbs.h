@@ -66,6 +66,7 @@ class PairGranNurbs : public PairGran {
   void require_host_settings();
   void refuse_sphere_features();
   void require_all_laws();
+  void warn_short_box();
   void warn_time_step();
 
   Neighbours order(int i, int j) const;
@@ -86,6 +87,7 @@ class PairGranNurbs : public PairGran {
   nurbs_host::ContactStep step_;
   nurbs::EnergyLedger stored_;
   nurbs_host::ContactCounts counts_;
+  bool short_box_warned_ = false;
   std::string last_warning_;
 };
 
