@@ -124,6 +124,12 @@ void FixWallNurbs::warn_time_step() {
   last_warning_ = warning;
 }
 
+void FixWallNurbs::setup(int vflag) {
+  post_force(vflag);
+  deep_.warn(lmp, std::string("Fix wall/nurbs ") + id,
+             "do particles reach through the wall, or is its normal reversed?", last_deep_warning_);
+}
+
 void FixWallNurbs::post_force(int) {
   step_.setup = update->setupflag != 0;
   step_.dt = update->dt;
@@ -151,6 +157,7 @@ void FixWallNurbs::compute_particle(int i) {
     }
     result = find_plane_contact(bodies_->particle(i), origin_, normal_, settings_, memory);
     counts_.add(result, 1);
+    if (step_.setup) deep_.add(result, atom->radius[i], 1);
     if (!nurbs_host::touches(result) && state.active == 0) return;
   }
   step_.same = 10 * settings_.tolerance * atom->radius[i] + 1e-13 * (separation.norm() + origin_.norm());

@@ -29,7 +29,7 @@ class FixWallNurbs : public Fix {
 
   int setmask() override;
   void init() override;
-  void setup(int vflag) override { post_force(vflag); }
+  void setup(int vflag) override;
   void post_force(int vflag) override;
   void reset_dt() override { warn_time_step(); }
   double compute_scalar() override;
@@ -71,7 +71,8 @@ class FixWallNurbs : public Fix {
   nurbs_host::ContactCounts counts_;
   nurbs::Vec3 force_ = nurbs::Vec3::Zero(), torque_ = nurbs::Vec3::Zero();  // on the wall, this rank's share
   bool periodic_warned_ = false;
-  std::string last_warning_;
+  nurbs_host::DeepContacts deep_;
+  std::string last_warning_, last_deep_warning_;
 };
 
 }  // namespace LAMMPS_NS

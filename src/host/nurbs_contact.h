@@ -75,6 +75,16 @@ struct ContactCounts {
   void add_safe(double weight);
 };
 
+// Contacts at the start of a run that are too deep for a penalty law: counted by all ranks, then told once.
+struct DeepContacts {
+  static constexpr double kDepth = 0.1;  // of the (smaller) bounding radius
+  double count = 0, deepest = 0;
+
+  void add(const nurbs::ContactResult& result, double radius, double weight);
+  // Collective. One warning, not repeated while `last` is the same; empties the counts.
+  void warn(LAMMPS* lmp, const std::string& user, const std::string& hint, std::string& last);
+};
+
 // How a contact is to be advanced.
 struct ContactStep {
   bool setup = false;  // forces before the first step of a run: nothing may move on

@@ -230,6 +230,7 @@ void PairGranNurbs::compute_force(int eflag, int vflag, int addflag) {
   counts_ = nurbs_host::ContactCounts{};
   for_each_neighbour(
       [this](const Neighbours& pair, int& touch, double* history) { compute_pair(pair, touch, history); });
+  if (step_.setup) deep_.warn(lmp, kUser, "do particles overlap?", last_deep_warning_);
   if (storeContactForces()) fix_contact_forces()->do_forward_comm();
   if (storeContactForcesStress()) fix_contact_forces_stress()->do_forward_comm();
 }
@@ -253,6 +254,7 @@ void PairGranNurbs::compute_pair(const Neighbours& pair, int& touch, double* his
     }
     result = find_contact(bodies_->particle(pair.a), bodies_->particle(pair.b), settings_, memory);
     counts_.add(result, pair.weight);
+    if (step_.setup) deep_.add(result, std::min(atom->radius[pair.a], atom->radius[pair.b]), pair.weight);
     if (result.status == nurbs::Status::unresolved) keep_case(pair);
     if (!nurbs_host::touches(result) && state.active == 0) return;
   }

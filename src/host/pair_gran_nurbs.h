@@ -88,7 +88,8 @@ class PairGranNurbs : public PairGran {
   nurbs::EnergyLedger stored_;
   nurbs_host::ContactCounts counts_;
   bool short_box_warned_ = false;
-  std::string last_warning_;
+  nurbs_host::DeepContacts deep_;
+  std::string last_warning_, last_deep_warning_;
 };
 
 }  // namespace LAMMPS_NS

@@ -270,6 +270,26 @@ dump p all local 100 pgl.dump c_pgl[7] c_pgl[8] c_pgl[10] c_pgl[11] c_pgl[12] c_
                 self.assertIn("0.0999 long in y", line)
 
 
+    def test_deep_contacts_at_the_start_are_counted(self):
+        def ball(number, x, z, y=0.0, radius=0.025):
+            return (number, 2, 2, radius, 2500.0, x, y, z, 1.0, 0.0, 0.0, 0.0)
+
+        # 1-2 across the ranks, 30 % of the smaller radius; 3-4, 5 %; 5 reaches 40 % through the wall, 6 is behind it
+        balls = [ball(1, -0.0175, 0.1), ball(2, 0.0215, 0.1, radius=0.02), ball(3, -0.1, 0.1),
+                 ball(4, -0.1, 0.14875), ball(5, 0.1, 0.015), ball(6, 0.1, -0.03, 0.1), ball(7, 0.1, 0.2)]
+        for ranks in (1, 2):
+            run = deck.run_ok(scene(run="run 0\nrun 0"), ranks=ranks,
+                              files={**files(), "bodies.data": deck.data_file(balls, box=BOX, types=2)})
+            pair, = self.warnings(run, "Pair gran/nurbs: at the start of the run contacts deeper than 10 %")
+            self.assertIn(": 1, deepest 30 %; do particles overlap?", pair)
+            wall, = self.warnings(run, "Fix wall/nurbs w: at the start of the run contacts deeper than 10 %")
+            self.assertIn(": 2, deepest 220 %;", wall)
+            self.assertIn("normal reversed?", wall)
+
+    def test_shallow_contacts_are_not_warned_of(self):
+        self.assertFalse(self.warnings(deck.run_ok(scene(run="run 4321\nrun 1"), files=files()), "at the start"))
+
+
 class BadInput(unittest.TestCase):
 
     def fails(self, text, *words):
