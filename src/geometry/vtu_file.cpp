@@ -2,7 +2,9 @@
 #include "geometry/vtu_file.h"
 
 #include <cstdint>
+#include <cstdlib>
 #include <cstring>
+#include <istream>
 #include <ostream>
 
 #include "geometry/vtk_bezier.h"
@@ -210,6 +212,20 @@ void write_pvd(std::ostream& out, const std::vector<std::pair<double, std::strin
     out << "<DataSet timestep=\"" << time << "\" part=\"0\" file=\"" << file << "\"/>\n";
   }
   out << "</Collection>\n</VTKFile>\n";
+}
+
+std::vector<std::pair<double, std::string>> read_pvd(std::istream& in) {
+  constexpr char before_time[] = "<DataSet timestep=\"", before_file[] = "file=\"";
+  std::vector<std::pair<double, std::string>> entries;
+  for (std::string line; std::getline(in, line);) {
+    const std::size_t file = line.find(before_file);
+    if (line.rfind(before_time, 0) != 0 || file == std::string::npos) continue;
+    const std::size_t begin = file + std::strlen(before_file), end = line.find('"', begin);
+    if (end == std::string::npos) continue;
+    entries.emplace_back(std::strtod(line.c_str() + std::strlen(before_time), nullptr),
+                         line.substr(begin, end - begin));
+  }
+  return entries;
 }
 
 }  // namespace nurbs

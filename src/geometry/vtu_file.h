@@ -33,5 +33,7 @@ void write_vtu(std::ostream& out, const std::vector<VtuBody>& bodies, const std:
 
 // Writes a ParaView collection (.pvd): which file shows which time. Entries are (time, file name).
 void write_pvd(std::ostream& out, const std::vector<std::pair<double, std::string>>& entries);
+// Entries of a collection written by write_pvd; lines that are none are passed over.
+std::vector<std::pair<double, std::string>> read_pvd(std::istream& in);
 
 }  // namespace nurbs

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
+#include <cstring>
 #include <limits>
 #include <vector>
 
@@ -172,8 +173,20 @@ void AtomVecNurbs::init() {
   if (domain->dimension != 3) nurbs_host::fail_all(FLERR, lmp, "atom_style nurbs needs a 3d simulation");
   if (domain->is_wedge) nurbs_host::fail_all(FLERR, lmp, "atom_style nurbs cannot be used in a wedge domain");
   if (shapes_.count() == 0) nurbs_host::fail_all(FLERR, lmp, "atom_style nurbs has no shapes");
+  refuse_insertion();
   for (int i = 0; i < atom->nlocal; ++i) follow_set_command(i);
   if (const std::string bad = check_all_owned(); !bad.empty()) nurbs_host::fail_one(lmp, bad);
+}
+
+// The host inserts when a run begins, after init.
+void AtomVecNurbs::refuse_insertion() {
+  for (int k = 0; k < modify->nfix; ++k)
+    if (std::strncmp(modify->fix[k]->style, "insert/", 7) == 0)
+      nurbs_host::fail_all(
+          FLERR, lmp,
+          std::string("Fix ") + modify->fix[k]->style +
+              " inserts spheres and can't be used with atom_style nurbs; give the particles in "
+              "a data file (read_data) or by create_atoms");
 }
 
 // The host's `set` command treats a particle as a sphere. `set diameter` (of the bounding sphere) means a

@@ -112,6 +112,7 @@ class AtomVecNurbs : public AtomVec {
   double* get_border(int n, int first, bool velocity, double* p);
 
   int append_atom(int type, const double* coord, tagint image);
+  void refuse_insertion();
   void follow_set_command(int i);
   void update_size(int i);
   std::string check_all_owned() const;

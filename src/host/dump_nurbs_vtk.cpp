@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cerrno>
 #include <cstdio>
+#include <cstdlib>
 #include <cstring>
 #include <fstream>
 
@@ -97,7 +98,22 @@ void DumpNurbsVtk::write_data(int n, double* particles) {
   for (int i = 0; i < n; ++i) bodies_.push_back(unpack_particle(particles + i * kParticleSize));
 }
 
+// A run that starts at a later step (after read_restart) keeps the snapshots of steps before it.
+void DumpNurbsVtk::continue_film() {
+  std::ifstream in(collection_name(file_before_star_));
+  const std::string before = without_folder(file_before_star_);
+  for (const auto& [time, file] : nurbs::read_pvd(in)) {
+    if (file.compare(0, before.size(), before) != 0) continue;
+    const std::string rest = file.substr(before.size());
+    char* end = nullptr;
+    const long long step = std::strtoll(rest.c_str(), &end, 10);
+    if (end != rest.c_str() && file_after_star_ == end && step < update->firststep)
+      snapshots_.emplace_back(time, file);
+  }
+}
+
 void DumpNurbsVtk::save_snapshot() {
+  if (snapshots_.empty() && update->firststep > 0) continue_film();
   std::sort(bodies_.begin(), bodies_.end(), [](const VtuBody& a, const VtuBody& b) { return a.id < b.id; });
   const ShapeLibrary& library = static_cast<const AtomVecNurbs*>(atom->avec)->shapes();
   std::vector<const nurbs::Shape*> shapes;

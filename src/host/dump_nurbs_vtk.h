@@ -37,6 +37,7 @@ class DumpNurbsVtk : public Dump {
   void write_data(int n, double* particles) override;
 
  private:
+  void continue_film();
   void save_snapshot();
   void save(const std::string& file, const std::function<void(std::ostream&)>& content);
 

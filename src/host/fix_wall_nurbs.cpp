@@ -2,6 +2,7 @@
 #include "host/fix_wall_nurbs.h"
 
 #include <algorithm>
+#include <cmath>
 #include <cstring>
 
 #include "atom.h"
@@ -89,7 +90,23 @@ void FixWallNurbs::init() {
     if (std::strcmp(modify->fix[k]->style, "freeze") == 0) freeze_groupbit_ = modify->fix[k]->groupbit;
   const int walls = static_cast<int>(all(lmp).size());
   comm->maxexchange_fix = std::max(comm->maxexchange_fix, walls * kHistorySize);
+  warn_periodic();
   warn_time_step();
+}
+
+void FixWallNurbs::warn_periodic() {
+  std::string directions;
+  for (int k = 0; k < 3; ++k) {
+    const Vec3 edge = nurbs_host::box_edge(*domain, k);
+    if (domain->periodicity[k] && std::abs(normal_.dot(edge)) > 1e-9 * edge.norm())
+      directions += std::string(" ") + "xyz"[k];
+  }
+  if (directions.empty() || periodic_warned_) return;
+  periodic_warned_ = true;
+  nurbs_host::warn(FLERR, lmp,
+                   std::string("Fix wall/nurbs ") + id + ": the plane's normal lies along periodic" +
+                       directions +
+                       "; particles that leave there come back behind the plane; use boundary f");
 }
 
 void FixWallNurbs::warn_time_step() {
@@ -105,6 +122,12 @@ void FixWallNurbs::warn_time_step() {
                               nurbs_host::show(step) + " or less";
   if (warning != last_warning_) nurbs_host::warn(FLERR, lmp, warning);
   last_warning_ = warning;
+}
+
+void FixWallNurbs::setup(int vflag) {
+  post_force(vflag);
+  deep_.warn(lmp, std::string("Fix wall/nurbs ") + id,
+             "do particles reach through the wall, or is its normal reversed?", last_deep_warning_);
 }
 
 void FixWallNurbs::post_force(int) {
@@ -134,6 +157,7 @@ void FixWallNurbs::compute_particle(int i) {
     }
     result = find_plane_contact(bodies_->particle(i), origin_, normal_, settings_, memory);
     counts_.add(result, 1);
+    if (step_.setup) deep_.add(result, atom->radius[i], 1);
     if (!nurbs_host::touches(result) && state.active == 0) return;
   }
   step_.same = 10 * settings_.tolerance * atom->radius[i] + 1e-13 * (separation.norm() + origin_.norm());

@@ -29,7 +29,7 @@ class FixWallNurbs : public Fix {
 
   int setmask() override;
   void init() override;
-  void setup(int vflag) override { post_force(vflag); }
+  void setup(int vflag) override;
   void post_force(int vflag) override;
   void reset_dt() override { warn_time_step(); }
   double compute_scalar() override;
@@ -57,6 +57,7 @@ class FixWallNurbs : public Fix {
   void parse_plane(int narg, char** arg);
   void compute_particle(int i);
   void apply(int i, const nurbs::ContactState& state);
+  void warn_periodic();
   void warn_time_step();
 
   nurbs::Vec3 origin_ = nurbs::Vec3::Zero(), normal_ = nurbs::Vec3::UnitZ();
@@ -69,7 +70,9 @@ class FixWallNurbs : public Fix {
   nurbs::EnergyLedger stored_, dissipated_;
   nurbs_host::ContactCounts counts_;
   nurbs::Vec3 force_ = nurbs::Vec3::Zero(), torque_ = nurbs::Vec3::Zero();  // on the wall, this rank's share
-  std::string last_warning_;
+  bool periodic_warned_ = false;
+  nurbs_host::DeepContacts deep_;
+  std::string last_warning_, last_deep_warning_;
 };
 
 }  // namespace LAMMPS_NS

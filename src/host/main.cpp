@@ -2,6 +2,7 @@
 #include <mpi.h>
 
 #include <csignal>
+#include <cstdio>
 
 #include "input.h"
 #include "lammps.h"
@@ -23,6 +24,8 @@ void install_signal_handlers() {
 }  // namespace
 
 int main(int argc, char** argv) {
+  // The host's errors end the program without a flush, and a pipe or a file would not see them.
+  std::setvbuf(stdout, nullptr, _IOLBF, BUFSIZ);
   install_signal_handlers();
   MPI_Init(&argc, &argv);
   auto* lammps = new LAMMPS_NS::LAMMPS(argc, argv, MPI_COMM_WORLD);

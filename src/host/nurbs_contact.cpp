@@ -1,11 +1,17 @@
 // See nurbs_contact.h.
 #include "host/nurbs_contact.h"
 
+#include <mpi.h>
+
+#include <algorithm>
 #include <cmath>
+#include <cstdio>
 #include <cstdlib>
 
 #include "atom.h"
+#include "domain.h"
 #include "host/host_error.h"
+#include "lammps.h"
 
 namespace LAMMPS_NS::nurbs_host {
 
@@ -101,6 +107,12 @@ BodyMotion motion_of(const AtomVecNurbs& bodies, const Atom& atom, int i, double
                             axes.toRotationMatrix(), dt);
 }
 
+Vec3 box_edge(const Domain& domain, int k) {
+  if (k == 0) return {domain.xprd, 0, 0};
+  if (k == 1) return {domain.triclinic ? domain.xy : 0, domain.yprd, 0};
+  return {domain.triclinic ? domain.xz : 0, domain.triclinic ? domain.yz : 0, domain.zprd};
+}
+
 void ContactCounts::add_safe(double weight) {
   value[neighbours] += weight;
   value[safe] += weight;
@@ -112,6 +124,27 @@ void ContactCounts::add(const ContactResult& result, double weight) {
   if (touches(result)) value[contacts] += weight;
   value[iterations] += weight * result.iterations;
   if (result.status == Status::unresolved) value[unresolved] += weight;
+}
+
+void DeepContacts::add(const ContactResult& result, double radius, double weight) {
+  if (!touches(result) || -result.gap <= kDepth * radius) return;
+  count += weight;
+  deepest = std::max(deepest, -result.gap / radius);
+}
+
+void DeepContacts::warn(LAMMPS* lmp, const std::string& user, const std::string& hint, std::string& last) {
+  DeepContacts all;
+  MPI_Allreduce(&count, &all.count, 1, MPI_DOUBLE, MPI_SUM, lmp->world);
+  MPI_Allreduce(&deepest, &all.deepest, 1, MPI_DOUBLE, MPI_MAX, lmp->world);
+  *this = DeepContacts{};
+  if (all.count == 0) return;
+  char numbers[128];
+  std::snprintf(numbers, sizeof numbers,
+                "contacts deeper than %g %% of the bounding radius: %.0f, deepest %.3g %%", 100 * kDepth,
+                all.count, 100 * all.deepest);
+  const std::string warning = user + ": at the start of the run " + numbers + "; " + hint;
+  if (warning != last) nurbs_host::warn(FLERR, lmp, warning);
+  last = warning;
 }
 
 bool touches(const ContactResult& result) {

@@ -44,6 +44,9 @@ double parse_not_negative(LAMMPS* lmp, const std::string& what, const char* text
 nurbs::BodyMotion motion_of(const AtomVecNurbs& bodies, const class Atom& atom, int i, double dt,
                             int freeze_groupbit);
 
+// Edge k of the box as a vector.
+nurbs::Vec3 box_edge(const class Domain& domain, int k);
+
 // Settings of the host: a pair proven apart needs no more.
 inline nurbs::ContactSettings contacts_only() {
   nurbs::ContactSettings settings;
@@ -70,6 +73,16 @@ struct ContactCounts {
 
   void add(const nurbs::ContactResult& result, double weight);
   void add_safe(double weight);
+};
+
+// Contacts at the start of a run that are too deep for a penalty law: counted by all ranks, then told once.
+struct DeepContacts {
+  static constexpr double kDepth = 0.1;  // of the (smaller) bounding radius
+  double count = 0, deepest = 0;
+
+  void add(const nurbs::ContactResult& result, double radius, double weight);
+  // Collective. One warning, not repeated while `last` is the same; empties the counts.
+  void warn(LAMMPS* lmp, const std::string& user, const std::string& hint, std::string& last);
 };
 
 // How a contact is to be advanced.

@@ -152,7 +152,25 @@ void PairGranNurbs::init_style() {
   history_fix_ = dynamic_cast<FixContactHistoryNurbs*>(fix_history);
   if (history_fix_ == nullptr)
     fail_all(FLERR, lmp, "Pair gran/nurbs: fix contacthistory is not the NURBS one");
+  warn_short_box();
   warn_time_step();
+}
+
+// Two particles can touch twice, across a short periodic edge, but have one history.
+void PairGranNurbs::warn_short_box() {
+  double mine = 0, largest = 0;
+  for (int i = 0; i < atom->nlocal; ++i) mine = std::max(mine, atom->radius[i]);
+  MPI_Allreduce(&mine, &largest, 1, MPI_DOUBLE, MPI_MAX, world);
+  for (int k = 0; k < 3 && !short_box_warned_; ++k) {
+    const double length = nurbs_host::box_edge(*domain, k).norm();
+    if (!domain->periodicity[k] || length >= 4 * largest) continue;
+    short_box_warned_ = true;
+    nurbs_host::warn(FLERR, lmp,
+                     std::string("Pair gran/nurbs: the periodic box is ") + nurbs_host::show(length) +
+                         " long in " + "xyz"[k] + "; two largest bounding diameters, " +
+                         nurbs_host::show(4 * largest) +
+                         ", are needed, or two particles that touch twice share one contact history");
+  }
 }
 
 void PairGranNurbs::reset_dt() {
@@ -212,6 +230,7 @@ void PairGranNurbs::compute_force(int eflag, int vflag, int addflag) {
   counts_ = nurbs_host::ContactCounts{};
   for_each_neighbour(
       [this](const Neighbours& pair, int& touch, double* history) { compute_pair(pair, touch, history); });
+  if (step_.setup) deep_.warn(lmp, kUser, "do particles overlap?", last_deep_warning_);
   if (storeContactForces()) fix_contact_forces()->do_forward_comm();
   if (storeContactForcesStress()) fix_contact_forces_stress()->do_forward_comm();
 }
@@ -235,6 +254,7 @@ void PairGranNurbs::compute_pair(const Neighbours& pair, int& touch, double* his
     }
     result = find_contact(bodies_->particle(pair.a), bodies_->particle(pair.b), settings_, memory);
     counts_.add(result, pair.weight);
+    if (step_.setup) deep_.add(result, std::min(atom->radius[pair.a], atom->radius[pair.b]), pair.weight);
     if (result.status == nurbs::Status::unresolved) keep_case(pair);
     if (!nurbs_host::touches(result) && state.active == 0) return;
   }

@@ -66,6 +66,7 @@ class PairGranNurbs : public PairGran {
   void require_host_settings();
   void refuse_sphere_features();
   void require_all_laws();
+  void warn_short_box();
   void warn_time_step();
 
   Neighbours order(int i, int j) const;
@@ -86,7 +87,9 @@ class PairGranNurbs : public PairGran {
   nurbs_host::ContactStep step_;
   nurbs::EnergyLedger stored_;
   nurbs_host::ContactCounts counts_;
-  std::string last_warning_;
+  bool short_box_warned_ = false;
+  nurbs_host::DeepContacts deep_;
+  std::string last_warning_, last_deep_warning_;
 };
 
 }  // namespace LAMMPS_NS

@@ -11,7 +11,6 @@
 #include <fstream>
 #include <functional>
 #include <map>
-#include <set>
 #include <stdexcept>
 #include <string>
 #include <utility>
@@ -28,7 +27,7 @@ using namespace nurbs;
 using Surfaces = std::vector<NurbsSurface>;
 
 constexpr char kUsage[] =
-    "usage: nurbs-shape make KIND [options] -o FILE   make a shape file\n"
+    "usage: nurbs-shape make KIND [options] -o FILE   make a shape file; FILE alone, without -o, does too\n"
     "       nurbs-shape info FILE                     describe a shape\n"
     "       nurbs-shape check FILE                    exit 0 if FILE is a usable shape, 1 with the reason if "
     "not\n"
@@ -36,6 +35,7 @@ constexpr char kUsage[] =
 
 constexpr char kMakeUsage[] =
     "usage: nurbs-shape make KIND [options] -o FILE\n"
+    "       nurbs-shape make KIND [options] FILE\n"
     "\n"
     "  sphere            [--radius R]                            exact, six biquartic rational patches\n"
     "  ellipsoid         --axes A,B,C                            exact, six biquartic rational patches\n"
@@ -74,37 +74,51 @@ std::string format(const char* pattern, double value) {
 // Options of one command, each used at most once and none unknown.
 class Options {
  public:
-  // Splits `arguments` into --NAME VALUE or --NAME=VALUE, "-o FILE" and at most one plain FILE, which means
-  // the same.
-  Options(std::string command, const std::vector<std::string>& arguments) : command_(std::move(command)) {
+  // Splits `arguments` into --NAME VALUE or --NAME=VALUE with NAME in `allowed`, "-o FILE" and at most one
+  // plain FILE, which means the same.
+  Options(std::string command, const std::vector<std::string>& allowed,
+          const std::vector<std::string>& arguments)
+      : command_(std::move(command)) {
+    std::string last;  // the option before, if it was not the file
     for (size_t k = 0; k < arguments.size(); ++k) {
-      std::string name = arguments[k];
-      const size_t equals = name.rfind("--", 0) == 0 ? name.find('=') : std::string::npos;
-      std::string value;
-      if (equals != std::string::npos) {
-        value = name.substr(equals + 1);
-        name.resize(equals);
-      } else if (name.rfind("--", 0) == 0 || name == "-o") {
-        if (++k == arguments.size() || arguments[k] == "-o" || arguments[k].rfind("--", 0) == 0) {
-          fail(name + " needs a value");
+      std::string name = arguments[k], value;
+      if (!is_option(name)) {
+        if (!last.empty() && is_number_like(name)) {
+          fail(last + " takes its numbers with commas and no blanks, as 1,2,3, and " + name +
+               " follows after a blank");
         }
-        value = arguments[k];
-      } else {
         value = std::exchange(name, "-o");
+      } else {
+        const size_t equals = name.find('=');
+        if (equals != std::string::npos) value = name.substr(equals + 1);
+        name.resize(std::min(equals, name.size()));
+        if (name != "-o" && std::find(allowed.begin(), allowed.end(), name) == allowed.end()) {
+          std::string list;
+          for (const std::string& option : allowed) list += option + " ";
+          fail("unknown option " + name + "; allowed are " + list + "-o");
+        }
+        if (equals == std::string::npos) {
+          if (++k == arguments.size() || is_option(arguments[k])) fail(name + " needs a value");
+          value = arguments[k];
+        }
       }
-      if (!values_.emplace(name, value).second) fail(name + " is given twice");
+      last = name == "-o" ? "" : name;
+      if (const auto [first, fresh] = values_.emplace(name, value); !fresh) {
+        if (name == "-o") fail("the output file is given twice: " + first->second + " and " + value);
+        fail(name + " is given twice");
+      }
     }
   }
 
   std::string output() {
-    const auto file = take("-o");
+    const auto file = find("-o");
     if (!file || file->empty()) fail("no output file: add -o FILE");
     return *file;
   }
 
   // Numbers separated by commas, all in [lo, hi].
   std::vector<double> numbers(const std::string& name, size_t count, double lo, double hi) {
-    const auto text = take(name);
+    const auto text = find(name);
     if (!text) fail(name + " is missing");
     std::vector<double> out;
     for (size_t begin = 0; begin <= text->size();) {
@@ -141,20 +155,20 @@ class Options {
 
   bool has(const std::string& name) const { return values_.count(name) > 0; }
 
-  // After all options are taken: complains about one that the command does not know.
-  void finish() const {
-    for (const auto& [name, value] : values_) {
-      if (!taken_.count(name)) fail("unknown option " + name);
-    }
-  }
-
   [[noreturn]] void fail(const std::string& what) const { throw UsageError(command_ + ": " + what); }
 
   static constexpr double kLeast = 1e-150, kMost = 1e150;
 
  private:
-  const std::string* take(const std::string& name) {
-    taken_.insert(name);
+  static bool is_number_like(const std::string& text) {
+    return text.find_first_of("0123456789") != std::string::npos &&
+           text.find_first_not_of("0123456789.,+-eE") == std::string::npos;
+  }
+  static bool is_option(const std::string& text) {
+    return text.size() > 1 && text[0] == '-' && !is_number_like(text);
+  }
+
+  const std::string* find(const std::string& name) const {
     const auto found = values_.find(name);
     return found == values_.end() ? nullptr : &found->second;
   }
@@ -174,7 +188,6 @@ class Options {
 
   std::string command_;
   std::map<std::string, std::string> values_;
-  std::set<std::string> taken_;
 };
 
 // --- make
@@ -187,6 +200,18 @@ struct Body {
 
 std::string fit_note(double error) {
   return "largest distance from the exact surface " + format("%.3g", error);
+}
+
+Body make_sphere(Options& options) {
+  return {exact_ellipsoid(Vec3::Constant(options.positive("--radius", 1))), ""};
+}
+
+Body make_ellipsoid(Options& options) {
+  return {exact_ellipsoid(options.axes()), ""};
+}
+
+Body make_box(Options& options) {
+  return {box(options.axes()), ""};
 }
 
 Body make_revolved(Options& options) {
@@ -246,27 +271,22 @@ Body make_inertia(Options& options) {
   return body;
 }
 
-using Maker = std::function<Body(Options&)>;
+struct Maker {
+  std::vector<std::string> options;
+  std::function<Body(Options&)> make;
+};
+
 const std::map<std::string, Maker>& makers() {
   static const std::map<std::string, Maker> kMakers = {
-      {"sphere",
-       [](Options& o) {
-         return Body{exact_ellipsoid(Vec3::Constant(o.positive("--radius", 1))), ""};
-       }},
-      {"ellipsoid",
-       [](Options& o) {
-         return Body{exact_ellipsoid(o.axes()), ""};
-       }},
-      {"fitted-ellipsoid", make_fitted},
-      {"smooth-ellipsoid", make_smooth},
-      {"pebble", make_pebble},
-      {"superellipsoid", make_superellipsoid},
-      {"revolved", make_revolved},
-      {"box",
-       [](Options& o) {
-         return Body{box(o.axes()), ""};
-       }},
-      {"inertia", make_inertia},
+      {"sphere", {{"--radius"}, make_sphere}},
+      {"ellipsoid", {{"--axes"}, make_ellipsoid}},
+      {"fitted-ellipsoid", {{"--axes", "--spans"}, make_fitted}},
+      {"smooth-ellipsoid", {{"--axes"}, make_smooth}},
+      {"pebble", {{"--radius"}, make_pebble}},
+      {"superellipsoid", {{"--axes", "--exponent", "--spans"}, make_superellipsoid}},
+      {"revolved", {{"--equatorial", "--polar"}, make_revolved}},
+      {"box", {{"--axes"}, make_box}},
+      {"inertia", {{"--inertia", "--mass", "--density"}, make_inertia}},
   };
   return kMakers;
 }
@@ -294,10 +314,9 @@ int make(std::vector<std::string> arguments) {
     throw UsageError("make: unknown kind '" + arguments[0] + "'; see nurbs-shape make --help");
   }
   arguments.erase(arguments.begin());
-  Options options("make " + found->first, arguments);
+  Options options("make " + found->first, found->second.options, arguments);
   const std::string file = options.output();
-  Body body = found->second(options);
-  options.finish();
+  Body body = found->second.make(options);
   std::vector<std::string> warnings;
   const auto shape = make_shape(file, body.surfaces, std::nullopt, &warnings);
   write_whole(file, write_shape({std::move(body.surfaces), std::nullopt}));

@@ -243,6 +243,53 @@ dump p all local 100 pgl.dump c_pgl[7] c_pgl[8] c_pgl[10] c_pgl[11] c_pgl[12] c_
         self.assertAlmostEqual(float(lines[0].split("use ")[1].split()[0]), mass / 2000, delta=1e-6 * mass / 2000)
 
 
+    def warnings(self, run, words):
+        return [line for line in run.screen.splitlines() if "WARNING" in line and words in line]
+
+    def test_wall_across_a_periodic_edge_is_warned_of_once(self):
+        wall = "plane 0 0 0 0 0 2.5"
+        for normal, boundary, expected in (("0 0 1", "p p p", ["periodic z;"]), ("1 0 1", "p p f", ["periodic x;"]),
+                                           ("1 1 0", "p p f", ["periodic x y;"]), ("0 0 1", "p p f", [])):
+            text = scene(run="run 0\nrun 0").replace("boundary f f f", "boundary " + boundary)
+            run = deck.run_ok(text.replace(wall, "plane 0 0 -9 " + normal), files=files())
+            lines = self.warnings(run, "the plane's normal lies along")
+            self.assertEqual(len(lines), len(expected), run.screen)
+            for line, words in zip(lines, expected):
+                self.assertIn(words, line)
+                self.assertIn("use boundary f", line)
+
+    def test_short_periodic_box_is_warned_of_once(self):
+        ball = (3, 2, 2, 0.025, 2500.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0)
+        for width, count in ((0.0999, 1), (0.1001, 0)):
+            data = deck.data_file([ball], box=((-0.2, 0.2), (-width / 2, width / 2), (-0.2, 0.2)), types=2)
+            text = scene(run="run 0\nrun 0").replace("boundary f f f", "boundary f p f")
+            run = deck.run_ok(text, ranks=2, files={**files(), "bodies.data": data})
+            lines = self.warnings(run, "share one contact history")
+            self.assertEqual(len(lines), count, run.screen)
+            for line in lines:
+                self.assertIn("0.0999 long in y", line)
+
+
+    def test_deep_contacts_at_the_start_are_counted(self):
+        def ball(number, x, z, y=0.0, radius=0.025):
+            return (number, 2, 2, radius, 2500.0, x, y, z, 1.0, 0.0, 0.0, 0.0)
+
+        # 1-2 across the ranks, 30 % of the smaller radius; 3-4, 5 %; 5 reaches 40 % through the wall, 6 is behind it
+        balls = [ball(1, -0.0175, 0.1), ball(2, 0.0215, 0.1, radius=0.02), ball(3, -0.1, 0.1),
+                 ball(4, -0.1, 0.14875), ball(5, 0.1, 0.015), ball(6, 0.1, -0.03, 0.1), ball(7, 0.1, 0.2)]
+        for ranks in (1, 2):
+            run = deck.run_ok(scene(run="run 0\nrun 0"), ranks=ranks,
+                              files={**files(), "bodies.data": deck.data_file(balls, box=BOX, types=2)})
+            pair, = self.warnings(run, "Pair gran/nurbs: at the start of the run contacts deeper than 10 %")
+            self.assertIn(": 1, deepest 30 %; do particles overlap?", pair)
+            wall, = self.warnings(run, "Fix wall/nurbs w: at the start of the run contacts deeper than 10 %")
+            self.assertIn(": 2, deepest 220 %;", wall)
+            self.assertIn("normal reversed?", wall)
+
+    def test_shallow_contacts_are_not_warned_of(self):
+        self.assertFalse(self.warnings(deck.run_ok(scene(run="run 4321\nrun 1"), files=files()), "at the start"))
+
+
 class BadInput(unittest.TestCase):
 
     def fails(self, text, *words):

@@ -286,6 +286,13 @@ class BadInput(unittest.TestCase):
     def test_atom_style_without_files(self):
         self.refuse("units si\natom_style nurbs\n", "at least one shape file")
 
+    def test_errors_of_the_host_reach_a_pipe(self):
+        """Those of one rank end the program without a flush."""
+        for ranks in (1, 2):
+            run = deck.run("units si\ninclude absent.in\n", ranks=ranks)
+            self.assertNotEqual(run.status, 0)
+            self.assertTrue(any("Cannot open input script absent.in" in line for line in run.errors), run.screen)
+
     def test_missing_file(self):
         self.refuse("units si\natom_style nurbs brick.json absent.json\n", "absent.json", on=(1, 2, 4), files=SHAPES)
 
@@ -320,6 +327,19 @@ class BadInput(unittest.TestCase):
                                   ("compute c all nurbs/atom", "qw qx qy qz shape scale volume mass"),
                                   ("compute c all nurbs/atom q", "q must be one of")):
             self.refuse(HEADER + "read_data in.data\n" + command + "\n", expected, files=files())
+
+    def test_insertion_of_spheres(self):
+        """Insert fixes are refused before they insert; their templates are harmless."""
+        templates = ("fix t all particletemplate/sphere 15485863 atom_type 1 density constant 2500 radius constant 0.5\n"
+                     "fix d all particledistribution/discrete 32452843 1 t 1.0\n")
+        text = HEADER + "read_data in.data\natom_modify sort 0 0\n" + templates + "fix m all nve/nurbs\n"
+        region = "region r block -1 1 -1 1 6 9 units box\n"
+        for kind, options in (("pack", "insert_every once all_in yes particles_in_region 1 region r"),
+                              ("rate/region", "nparticles 1 particlerate 100 insert_every 10 all_in yes region r")):
+            insert = f"fix i all insert/{kind} seed 86028121 distributiontemplate d {options}\n"
+            self.refuse(text + region + insert + "run 10\n", f"Fix insert/{kind} ", "read_data", "create_atoms",
+                        on=(1, 2), files=files())
+        deck.run_ok(text + "run 1\n", files=files())
 
     def test_set_command_spoils_a_particle(self):
         self.refuse(HEADER + "read_data in.data\nset atom 2 diameter 0\nfix m all nve/nurbs\nrun 0\n", "Atom 2", "scale 0",

@@ -24,7 +24,12 @@ BAD = [(["cone"], "cone"),
        (["sphere", "--radius", "1e999"], "--radius"),
        (["sphere", "--radius", "2x"], "'2x' is not a number"),
        (["sphere", "--radius"], "--radius needs a value"),
-       (["sphere", "--size", "1"], "unknown option --size"),
+       (["sphere", "--size", "1"], "unknown option --size; allowed are --radius -o"),
+       (["sphere", "-r", "1"], "unknown option -r"),
+       (["ellipsoid", "--axis", "1,2,3"], "unknown option --axis; allowed are --axes -o"),
+       (["ellipsoid", "--axes", "0.012", "0.008", "0.006"], "--axes takes its numbers with commas and no blanks"),
+       (["ellipsoid", "--axes", "1,", "2,", "3"], "--axes takes its numbers with commas and no blanks"),
+       (["pebble", "other.json"], "the output file is given twice: other.json and "),
        (["sphere", "--radius", "1", "--radius", "2"], "--radius is given twice"),
        (["ellipsoid"], "--axes is missing"),
        (["ellipsoid", "--axes", "1,2"], "--axes has 2 numbers, must have 3"),
@@ -117,6 +122,12 @@ class NurbsShape(unittest.TestCase):
             run = call(*arguments)
             self.assertEqual(run.returncode, 0)
             self.assertTrue(run.stdout.startswith("usage: nurbs-shape"))
+        self.assertIn("make KIND [options] -o FILE\n       nurbs-shape make KIND [options] FILE\n",
+                      call("make", "--help").stdout)
+
+    def test_output_file_without_its_option(self):
+        self.assertEqual(call("make", "ellipsoid", "--axes", "1,2,3", str(self.file)).returncode, 0)
+        self.assertEqual([p.name for p in self.place.iterdir()], ["shape.json"])
 
 
 if __name__ == "__main__":

@@ -3,6 +3,7 @@
 import json
 import math
 import pathlib
+import re
 import sys
 import unittest
 
@@ -163,6 +164,23 @@ class DumpVtk(unittest.TestCase):
             self.assertAlmostEqual(read_time(read_grid(folder / f"scene-{step}.vtu")), step * 1e-3, delta=1e-15)
         self.assertEqual(sorted(f.name for f in folder.iterdir()),
                          ["scene-0.vtu", "scene-10.vtu", "scene-20.vtu", "scene.pvd"])
+
+    def test_collection_goes_on_after_a_restart(self):
+        """Entries before the restart's step stay, those after it go; a run from step 0 begins anew."""
+        first = deck.run_ok(DECK.format(file="scene-*.vtu") + "write_restart half.rst\nrun 20\n", files=self.files)
+        steps = [0, 10, 20, 30, 40]
+        self.assertEqual(self.listed(first), [(f"scene-{k}.vtu", k * 1e-3) for k in steps])
+        text = DECK[DECK.index("neighbor"):].format(file="scene-*.vtu").replace("run 20", "run 10")
+        start = "units si\nnewton off\ncommunicate single vel yes\natom_modify sort 0 0\nread_restart half.rst\n"
+        kept = {name: first.path / name for name in ("half.rst", "scene.pvd")}
+        again = deck.run_ok(start + text, files=kept)
+        self.assertEqual([name for name, _ in self.listed(again)], [f"scene-{k}.vtu" for k in (0, 10, 20, 30)])
+        anew = deck.run_ok(DECK.format(file="scene-*.vtu"), files={**self.files, "scene.pvd": kept["scene.pvd"]})
+        self.assertEqual([name for name, _ in self.listed(anew)], [f"scene-{k}.vtu" for k in (0, 10, 20)])
+
+    def listed(self, run):
+        entries = re.findall(r'timestep="(.*?)".*file="(.*?)"', run.read("scene.pvd"))
+        return [(name, round(float(time), 12)) for time, name in entries]
 
     def test_same_file_on_one_and_two_ranks(self):
         run = deck.run_ok(DECK.format(file="scene-*.vtu"), ranks=1, files=self.files)
