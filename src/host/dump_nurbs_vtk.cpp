@@ -98,18 +98,24 @@ void DumpNurbsVtk::write_data(int n, double* particles) {
   for (int i = 0; i < n; ++i) bodies_.push_back(unpack_particle(particles + i * kParticleSize));
 }
 
-// A run that starts at a later step (after read_restart) keeps the snapshots of steps before it.
+// A run that starts at a later step (after read_restart) keeps the snapshots of steps before it. The host
+// counts time from zero again there: the film's goes on.
 void DumpNurbsVtk::continue_film() {
   std::ifstream in(collection_name(file_before_star_));
   const std::string before = without_folder(file_before_star_);
+  bigint last = 0;
   for (const auto& [time, file] : nurbs::read_pvd(in)) {
     if (file.compare(0, before.size(), before) != 0) continue;
     const std::string rest = file.substr(before.size());
     char* end = nullptr;
     const long long step = std::strtoll(rest.c_str(), &end, 10);
-    if (end != rest.c_str() && file_after_star_ == end && step < update->firststep)
-      snapshots_.emplace_back(time, file);
+    if (end == rest.c_str() || file_after_star_ != end || step >= update->firststep) continue;
+    snapshots_.emplace_back(time, file);
+    last = step;
   }
+  if (!snapshots_.empty() && update->get_cur_time() <= snapshots_.back().first)
+    earlier_time_ = snapshots_.back().first + static_cast<double>(update->ntimestep - last) * update->dt -
+                    update->get_cur_time();
 }
 
 void DumpNurbsVtk::save_snapshot() {
@@ -122,7 +128,7 @@ void DumpNurbsVtk::save_snapshot() {
   char step[32];
   std::snprintf(step, sizeof step, "%0*lld", padflag, static_cast<long long>(update->ntimestep));
   const std::string file = file_before_star_ + step + file_after_star_;
-  const double time = update->get_cur_time();
+  const double time = earlier_time_ + update->get_cur_time();
   save(file, [&](std::ostream& out) { nurbs::write_vtu(out, bodies_, shapes, time); });
 
   const std::pair<double, std::string> snapshot(time, without_folder(file));

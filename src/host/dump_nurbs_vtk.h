@@ -44,6 +44,7 @@ class DumpNurbsVtk : public Dump {
   std::string file_before_star_, file_after_star_;
   std::vector<nurbs::VtuBody> bodies_;                      // rank 0: gathered so far
   std::vector<std::pair<double, std::string> > snapshots_;  // rank 0: (time, file name without its folder)
+  double earlier_time_ = 0;  // of the film, before the host began to count anew
 };
 
 }  // namespace LAMMPS_NS

@@ -174,7 +174,7 @@ class DumpVtk(unittest.TestCase):
         start = "units si\nnewton off\ncommunicate single vel yes\natom_modify sort 0 0\nread_restart half.rst\n"
         kept = {name: first.path / name for name in ("half.rst", "scene.pvd")}
         again = deck.run_ok(start + text, files=kept)
-        self.assertEqual([name for name, _ in self.listed(again)], [f"scene-{k}.vtu" for k in (0, 10, 20, 30)])
+        self.assertEqual(self.listed(again), [(f"scene-{k}.vtu", k * 1e-3) for k in (0, 10, 20, 30)])
         anew = deck.run_ok(DECK.format(file="scene-*.vtu"), files={**self.files, "scene.pvd": kept["scene.pvd"]})
         self.assertEqual([name for name, _ in self.listed(anew)], [f"scene-{k}.vtu" for k in (0, 10, 20)])
 
