@@ -62,12 +62,11 @@ constexpr double kSingular = 1e-13;  // 2 x 2 determinant over the sum of its pr
 constexpr double kStationary =
     1e-10;  // angle between the normals, and offset across them over the smaller radius
 constexpr double kLargestStep = 0.35;  // of a patch's parameter range in one Newton step
-constexpr double kNormalTrust = 0.3;  // second-order share of a normal's turn beyond which it is not used ...
+constexpr double kNormalTrust = 0.3;  // relative change of a tangent beyond which a step's normal is not used
 constexpr double kNearPole =
     1e-4;  // ratio of the tangents' lengths below which a plane's warm solve hands on
-constexpr double kNormalNoise = 1e-12;  // ... unless as small as this, rad
-constexpr int kWarmIterations = 4;      // 1 or 2 are usual
-constexpr int kPolishIterations = 12;   // from a cold start
+constexpr int kWarmIterations = 4;     // 1 or 2 are usual
+constexpr int kPolishIterations = 12;  // from a cold start
 
 // --- local model
 // ------------------------------------------------------------------------------------------------
