@@ -357,7 +357,8 @@ class Search {
     }
     const double distance = std::sqrt(best);
     upper_ = distance - shrink_ + roundoff();
-    return distance > roundoff() ? away_from(*feature, weights, closest) : hull_.face[nearest].normal;
+    const bool clear = feature && distance > roundoff();
+    return clear ? away_from(*feature, weights, closest) : hull_.face[nearest].normal;
   }
 
   const Vec3& g(const Face& f, int k) const { return hull_.vertex[f.vertex[k]].g; }

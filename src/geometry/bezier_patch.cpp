@@ -127,25 +127,28 @@ NURBS_INLINE void divide_by_weight(Lane4* a) {
 
 template <int Order>
 NURBS_INLINE void jet(const BezierPatch& patch, double u, double v, Lane4* a) {
-  const int p = patch.degree_u;
-  if (p != patch.degree_v)
-    homogeneous<0, 0, Order>(patch, u, v, a);
-  else if (p == 3)
-    homogeneous<3, 3, Order>(patch, u, v, a);
-  else if (p == 4)
-    homogeneous<4, 4, Order>(patch, u, v, a);
-  else if (p == 2)
-    homogeneous<2, 2, Order>(patch, u, v, a);
-  else if (p == 1)
-    homogeneous<1, 1, Order>(patch, u, v, a);
-  else
-    homogeneous<0, 0, Order>(patch, u, v, a);
+  switch (patch.degree_u == patch.degree_v ? patch.degree_u : 0) {
+    case 1:
+      homogeneous<1, 1, Order>(patch, u, v, a);
+      break;
+    case 2:
+      homogeneous<2, 2, Order>(patch, u, v, a);
+      break;
+    case 3:
+      homogeneous<3, 3, Order>(patch, u, v, a);
+      break;
+    case 4:
+      homogeneous<4, 4, Order>(patch, u, v, a);
+      break;
+    default:
+      homogeneous<0, 0, Order>(patch, u, v, a);
+  }
   if (patch.rational) divide_by_weight<Order>(a);
 }
 
 template <int Order>
 NURBS_INLINE void jet(const BezierPatch& patch, double u, double v, Vec3* const* out) {
-  Lane4 a[kJetSize[Order]];
+  Lane4 a[kJetSize[Order]] = {};
   jet<Order>(patch, u, v, a);
   for (int k = 0; k < kJetSize[Order]; ++k) to_vec3(a[k], *out[k]);
 }
@@ -174,9 +177,8 @@ Jet2 evaluate2(const BezierPatch& patch, double u, double v) {
 }
 
 void evaluate2(const BezierPatch& patch, double u, double v, JetLanes* out) {
-  Lane4 a[8];
+  Lane4 a[8] = {};
   jet<2>(patch, u, v, a);
-  a[6] = a[7] = Lane4{0, 0, 0, 0};
   Lane4 low[4], high[4];
   transpose({a[0], a[1], a[2], a[3]}, low);
   transpose({a[4], a[5], a[6], a[7]}, high);

@@ -31,15 +31,14 @@ NURBS_INLINE void join(const Lane4& low, const Lane4& high, Lane8& out) {
 
 // Columns of a 4 x 4 block of numbers given by its rows.
 NURBS_INLINE void transpose(const Lane4 (&&row)[4], Lane4 (&column)[4]) {
-  using Order = long long __attribute__((vector_size(32)));
-  const Lane4 even01 = __builtin_shuffle(row[0], row[1], Order{0, 4, 2, 6});
-  const Lane4 odd01 = __builtin_shuffle(row[0], row[1], Order{1, 5, 3, 7});
-  const Lane4 even23 = __builtin_shuffle(row[2], row[3], Order{0, 4, 2, 6});
-  const Lane4 odd23 = __builtin_shuffle(row[2], row[3], Order{1, 5, 3, 7});
-  column[0] = __builtin_shuffle(even01, even23, Order{0, 1, 4, 5});
-  column[1] = __builtin_shuffle(odd01, odd23, Order{0, 1, 4, 5});
-  column[2] = __builtin_shuffle(even01, even23, Order{2, 3, 6, 7});
-  column[3] = __builtin_shuffle(odd01, odd23, Order{2, 3, 6, 7});
+  const Lane4 even01 = __builtin_shufflevector(row[0], row[1], 0, 4, 2, 6);
+  const Lane4 odd01 = __builtin_shufflevector(row[0], row[1], 1, 5, 3, 7);
+  const Lane4 even23 = __builtin_shufflevector(row[2], row[3], 0, 4, 2, 6);
+  const Lane4 odd23 = __builtin_shufflevector(row[2], row[3], 1, 5, 3, 7);
+  column[0] = __builtin_shufflevector(even01, even23, 0, 1, 4, 5);
+  column[1] = __builtin_shufflevector(odd01, odd23, 0, 1, 4, 5);
+  column[2] = __builtin_shufflevector(even01, even23, 2, 3, 6, 7);
+  column[3] = __builtin_shufflevector(odd01, odd23, 2, 3, 6, 7);
 }
 
 }  // namespace nurbs

@@ -245,7 +245,7 @@ std::shared_ptr<const Shape> make_shape(const std::string& name, std::vector<Nur
     throw ShapeError(name + ": " + error.what());
   }
   if (warnings) {
-    for (const std::string& w : draft.warnings) warnings->push_back(name + ": " + w);
+    for (const std::string& w : draft.warnings) warnings->emplace_back(name).append(": ").append(w);
   }
   return std::make_shared<const Shape>(std::move(draft.shape));
 }
