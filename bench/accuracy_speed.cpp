@@ -130,7 +130,7 @@ void measure_errors(const Scene& scene, Entry& e, const std::vector<Answer>& ans
         continue;
       }
       e.gap.push_back(std::abs(x.gap - r.gap) / size);
-      e.normal.push_back(std::atan2(x.normal.cross(r.normal).norm(), x.normal.dot(r.normal)));
+      e.normal.push_back(angle_between(x.normal, r.normal));
       e.points.push_back(std::max((x.point_a - r.point_a).norm(), (x.point_b - r.point_b).norm()) / size);
     }
 }

@@ -7,6 +7,7 @@
 #include <map>
 #include <memory>
 
+#include "../tests/core/bodies.h"
 #include "../tests/core/ellipsoid_oracle.h"
 #include "contact/pair_search.h"
 #include "geometry/primitives.h"
@@ -216,11 +217,6 @@ double signed_gap(Random& random, double size, double least, double most) {
 // --- truths
 // ----------------------------------------------------------------------------------------------------
 
-double overlap_along(const PairCase& c, const Vec3& d) {
-  return c.a.scale * find_hull_support(*c.a.shape, c.a.q.conjugate() * d).h +
-         c.b.scale * find_hull_support(*c.b.shape, c.b.q.conjugate() * -d).h - d.dot(c.b.x - c.a.x);
-}
-
 const std::vector<Vec3>& spiral(int count) {
   static std::map<int, std::vector<Vec3>> made;
   std::vector<Vec3>& directions = made[count];
@@ -238,7 +234,7 @@ Truth search_truth(const PairCase& c, Random& random) {
     Vec3 d;
   };
   std::vector<Start> starts;
-  for (const Vec3& d : spiral(500)) starts.push_back({overlap_along(c, d), d});
+  for (const Vec3& d : spiral(500)) starts.push_back({test::overlap_along(c.a, c.b, d), d});
   std::sort(starts.begin(), starts.end(), [](const Start& x, const Start& y) { return x.p < y.p; });
   std::vector<Start> minima;
   for (const Start& s : starts) {
@@ -253,7 +249,7 @@ Truth search_truth(const PairCase& c, Random& random) {
       Start next = m;
       for (const Vec3& step : {t, Vec3(-t), s, Vec3(-s)}) {
         const Vec3 d = (m.d + stride * step).normalized();
-        const double p = overlap_along(c, d);
+        const double p = test::overlap_along(c.a, c.b, d);
         if (p < next.p) next = {p, d};
       }
       stride *= next.p < m.p ? 1.2 : 0.5;
@@ -621,7 +617,7 @@ PairCase blocky_faces(Random& random, long) {
   const Vec3 n = frame * Vec3::UnitZ();
   const Vec3 shift = frame * Vec3(random.uniform(-0.4, 0.4), random.uniform(-0.4, 0.4), 0);
   c.b.x = shift;
-  const double touching = overlap_along(c, n);
+  const double touching = test::overlap_along(c.a, c.b, n);
   c.b.x = shift + (touching + signed_gap(random, 1, 1e-9, 0.05)) * n;
   c.truth = search_truth(c, random);
   return c;
@@ -723,7 +719,7 @@ Verdict judge(const PairCase& c, const Answer& r, double mesh_error) {
   if (!std::isfinite(r.gap) || (r.has_normal && !r.normal.allFinite())) return fail(Failure::not_a_number);
   if (r.unresolved) return fail(Failure::unresolved);
   // Any normal shows that the gap is at least -p(normal); a searched truth may be no better.
-  const double along = r.has_normal ? -overlap_along(c, r.normal.normalized()) : -kFarAway;
+  const double along = r.has_normal ? -test::overlap_along(c.a, c.b, r.normal.normalized()) : -kFarAway;
   const double truth = c.truth.known == Known::bound ? std::max(c.truth.gap, along) : c.truth.gap;
   v.error = std::abs(r.gap - truth);
   if (r.gap * truth < 0 && std::min(std::abs(r.gap), std::abs(truth)) > v.allowed) return fail(Failure::sign);

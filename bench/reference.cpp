@@ -106,10 +106,10 @@ Reference make_reference(const Pair& pair) {
   PairMemory memory = {};
   const ContactResult ours = find_contact(pair.a, pair.b, settings, reinterpret_cast<double*>(&memory));
   const Reference fallback{ours.gap, ours.normal, ours.point_a, ours.point_b, false};
-  const BezierPatch &patch_a = pair.a.shape->patches[static_cast<int>(memory.patch_a)],
-                    &patch_b = pair.b.shape->patches[static_cast<int>(memory.patch_b)];
+  const BezierPatch &patch_a = pair.a.shape->patches[static_cast<int>(memory.on_a.patch)],
+                    &patch_b = pair.b.shape->patches[static_cast<int>(memory.on_b.patch)];
   const Vector offset = pair.b.x.cast<Real>() - pair.a.x.cast<Real>();
-  Vector4 at(memory.u_a, memory.v_a, memory.u_b, memory.v_b);
+  Vector4 at(memory.on_a.u, memory.on_a.v, memory.on_b.u, memory.on_b.v);
   Real last = 1;
   for (int k = 0; k < kNewtonSteps && last > kConverged; ++k) {
     const System s = contact_equations(place(pair.a, Vector::Zero(), evaluate(patch_a, at[0], at[1])),

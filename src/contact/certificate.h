@@ -34,16 +34,13 @@ struct Bracket {
   double width() const { return upper - lower; }
 };
 
-// Excess of h(d) over d . (surface point with normal n): P (1 - cos) by the rolling ball; where that is
-// infinite (flats, grooves), at most the slope of the tangent plane times the diameter.
+// Excess of h(d) over d . (surface point with normal n).
 inline double support_excess(const Shape& shape, double scale, const RollingRadii& radii, const Vec3& d,
                              const Vec3& n) {
   const double chord2 = (d - n).squaredNorm();  // 2 (1 - cos), without cancellation
   if (chord2 <= kNormalMargin * kNormalMargin && radii.near < kFarAway)
     return 0.5 * scale * radii.near * chord2;
-  const double diameter = 2 * shape.bounding_radius;
-  const bool rolls = 0.25 * radii.outer * radii.outer * chord2 < diameter * diameter;
-  return scale * ((rolls ? 0.5 * radii.outer * chord2 : diameter * std::sqrt(chord2)) + radii.slack);
+  return scale * (rolling_excess(radii.outer, shape.bounding_radius, chord2) + radii.slack);
 }
 
 // Radii at a point whose normal is n in axes that `axes` turns the shape's into.

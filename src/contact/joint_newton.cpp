@@ -33,6 +33,8 @@ struct Symmetric {
 };
 struct Square {
   double a, b, c, d;  // a b; c d
+  double det() const { return a * d - b * c; }
+  bool singular() const { return !(std::abs(det()) > kSingular * (std::abs(a * d) + std::abs(b * c))); }
   Square operator*(const Symmetric& m) const {
     return {a * m.a + b * m.b, a * m.b + b * m.c, c * m.a + d * m.b, c * m.b + d * m.c};
   }
@@ -80,10 +82,9 @@ NURBS_INLINE Steps newton_step(const PointPair& p, const JetLanes& ja, const For
   const Square t{across.a, across.c, across.b, across.d};
   const Square bent = left * t;  // minus M21 M11^-1 T
   const Square schur{b.second.a - bent.a, b.second.b - bent.b, b.second.b - bent.c, b.second.c - bent.d};
-  const double det = schur.a * schur.d - schur.b * schur.c;
-  if (!(std::abs(det) > kSingular * (std::abs(schur.a * schur.d) + std::abs(schur.b * schur.c))))
-    return steps;
-  const double r = -1 / det, ru = left.a * f1u + left.b * f1v + f2u, rv = left.c * f1u + left.d * f1v + f2v;
+  if (schur.singular()) return steps;
+  const double r = -1 / schur.det(), ru = left.a * f1u + left.b * f1v + f2u,
+               rv = left.c * f1u + left.d * f1v + f2v;
   const double bu = r * (schur.d * ru - schur.b * rv), bv = r * (schur.a * rv - schur.c * ru);
   const double au = t.a * bu + t.b * bv - f1u, av = t.c * bu + t.d * bv - f1v;
   steps.b = {bu, bv};
@@ -198,7 +199,6 @@ JointSolution solve_joint(const PairFrame& pair, const SurfacePoint& on_a, const
   PointPair& p = out.points;
   p.on_a = on_a;
   p.on_b = on_b;
-  out.turn = 0;
   const Mat3 frame_b = pair.scale_b * pair.turn;
   for (out.iterations = 1;; ++out.iterations) {
     evaluate(pair, frame_b, out);
@@ -208,7 +208,7 @@ JointSolution solve_joint(const PairFrame& pair, const SurfacePoint& on_a, const
     p.na = na.direction;
     p.nb = nb.direction;
     out.bracket = certify(pair, p);
-    if (!out.bracket.dented) out.turn = kNormalMargin;
+    out.turn = out.bracket.dented ? 0 : kNormalMargin;
     out.converged = close_enough(out.bracket, tolerance, pair.size) || far_enough(out.bracket, enough);
     out.stationary = !out.converged && is_stationary(pair, p);
     const Forms a(out.jet_a, p.na), b(out.jet_b, p.na);

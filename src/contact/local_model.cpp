@@ -58,30 +58,6 @@ struct Turns {
   }
 };
 
-// A body's half turned to its present orientation.
-struct Turned {
-  Vec3 arm, normal, t, s;
-  const double* w;
-
-  Turned(const SupportModel& m, const Mat3& turn)
-      : arm(turn * vec(m.arm)),
-        normal(turn * vec(m.normal)),
-        t(turn * vec(m.tangent)),
-        s(normal.cross(t)),
-        w(m.w) {}
-
-  Vec3 map(const Vec3& x) const {  // W x
-    const double a = t.dot(x), b = s.dot(x);
-    return (w[0] * a + w[1] * b) * t + (w[1] * a + w[2] * b) * s;
-  }
-
-  // The model's support point in direction d, whose product with d is the model's h; moved = W (d - n). Exact
-  // on a sphere.
-  Vec3 point(const Vec3& d, const Vec3& moved) const {
-    return arm + moved - d.dot(moved) / (1 + d.dot(normal)) * normal;
-  }
-};
-
 }  // namespace
 
 bool make_support_model(const Mat3& axes, const Vec3& center, const SurfacePoint& at, const JetLanes& jet,
@@ -112,8 +88,10 @@ bool make_support_model(const Mat3& axes, const Vec3& center, const SurfacePoint
   return std::isfinite(model->w[0] + model->w[1] + model->w[2]) && std::isfinite(rate);
 }
 
-Mat3 turn_since(const Quat& q, const double* q0) {
-  return (q * Quat(q0[0], -q0[1], -q0[2], -q0[3])).toRotationMatrix();
+void limit_turn(const Shape& shape, double scale, double turn, SupportModel* model) {
+  if (shape.normal_map.cells == 0) return;
+  // W (d - n) is at least the least curvature radius times the turn.
+  model->room = std::min(model->room, turn * scale * shape.patch_curvature.min_radius);
 }
 
 LocalContact evaluate_local(const LocalModel& model, const Quat& q_a, const double* q0_a, const Quat& q_b,
@@ -168,17 +146,20 @@ LocalContact evaluate_local(const LocalModel& model, const Quat& q_a, const doub
   return c;
 }
 
-LocalSupport evaluate_local_support(const SupportModel& model, const Mat3& turn, const Vec3& d) {
-  const Turned body(model, turn);
-  const Vec3 change = d - body.normal, moved = body.map(change);
-  const double angle = change.norm();
-  LocalSupport s;
-  s.point = body.point(d, moved);
-  s.h = d.dot(s.point);
-  s.error = kRemainderSafety * model.rate * angle * angle * angle / 6;
-  s.drift = 0.5 * model.rate * angle * angle;
-  s.valid = moved.norm() <= model.room;
-  return s;
+LocalSupport evaluate_local_support(const SupportModel& model, const Quat& q, const double* q0,
+                                    const Vec3& d) {
+  const Mat3 turn = (q * Quat(q0[0], -q0[1], -q0[2], -q0[3])).toRotationMatrix();
+  const Vec3 n = turn * vec(model.normal), t = turn * vec(model.tangent), s = n.cross(t), change = d - n;
+  const double a = t.dot(change), b = s.dot(change), *w = model.w;
+  const Vec3 moved = (w[0] * a + w[1] * b) * t + (w[1] * a + w[2] * b) * s;
+  const double angle2 = change.squaredNorm();
+  LocalSupport support;
+  support.point = turn * vec(model.arm) + moved - d.dot(moved) / (1 + d.dot(n)) * n;
+  support.h = d.dot(support.point);
+  support.error = cubic_remainder(model.rate, angle2);
+  support.drift = 0.5 * model.rate * angle2;
+  support.valid = moved.norm() <= model.room;
+  return support;
 }
 
 }  // namespace nurbs

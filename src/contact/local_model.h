@@ -15,7 +15,10 @@
 //     |error of the gap| <= (L_A t_A^3 + L_B t_B^3) / 6 + |grad p|^2 / (2 least eigenvalue of Hess p).
 #pragma once
 
+#include <cmath>
+
 #include "contact/pair_frame.h"
+#include "geometry/tolerances.h"
 
 namespace nurbs {
 
@@ -47,10 +50,17 @@ struct LocalContact {
 bool make_support_model(const Mat3& axes, const Vec3& center, const SurfacePoint& at, const JetLanes& jet,
                         double rate, SupportModel* model);
 
-// Rotation from the reference orientation q0 (w x y z) to q, as a matrix.
-Mat3 turn_since(const Quat& q, const double* q0);
+// Bound on the third-order remainder of one body's half, a length, for a turn of the root of `angle2`.
+inline double cubic_remainder(double rate, double angle2) {
+  return kRemainderSafety / 6 * rate * angle2 * std::sqrt(angle2);
+}
 
-// One body against a fixed plane, whose direction d (unit, from the body into the plane) does not change.
+// Keeps the model from turns that may reach another support point: to `turn` (rad) at most. On bodies whose
+// normal map says where those are; others have none.
+void limit_turn(const Shape& shape, double scale, double turn, SupportModel* model);
+
+// One body, turned from q0 to q, against a fixed plane, whose direction d (unit, from the body into the
+// plane) does not change.
 struct LocalSupport {
   double h;      // d . point
   double error;  // |true h - h| <= error
@@ -58,7 +68,8 @@ struct LocalSupport {
   Vec3 point;    // from the body's centre of mass, lab
   bool valid;
 };
-LocalSupport evaluate_local_support(const SupportModel& model, const Mat3& turn, const Vec3& d);
+LocalSupport evaluate_local_support(const SupportModel& model, const Quat& q, const double* q0,
+                                    const Vec3& d);
 
 // The contact now: bodies turned from the reference orientations q0 (w x y z) to q, B's centre at `offset`
 // from A's. No surface evaluation; ~50 ns.

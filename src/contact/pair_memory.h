@@ -11,6 +11,12 @@
 
 namespace nurbs {
 
+// A surface point.
+struct PointMemory {
+  double patch, u, v;
+  double step[2];  // how far it went from the solve before, in (u, v); 0 across patches
+};
+
 struct PairMemory {
   double known;  // 0 empty; 1 the reference pose and `lower` are set; 2 the surface points too; 3 the local
                  // model too
@@ -18,12 +24,9 @@ struct PairMemory {
   double offset[3];  // x_B - x_A, lab
   double q_a[4];     // orientations, w x y z
   double q_b[4];
-  double direction[3];  // unit d, lab, along which ...
-  double lower;         // ... the gap was proven at least this large
-  // Surface points of the last solve, the warm start.
-  double patch_a, u_a, v_a;
-  double patch_b, u_b, v_b;
-  double step_a[2], step_b[2];  // how far they went from the solve before, in (u, v); 0 across patches
+  double direction[3];     // unit d, lab, along which ...
+  double lower;            // ... the gap was proven at least this large
+  PointMemory on_a, on_b;  // of the last solve, the warm start
   // Local quadratic model at the reference pose, and the overlap below which its contact is the only one.
   LocalModel model;
   double unique;
@@ -54,22 +57,17 @@ inline void store(const Quat& q, double* to) {
 }
 
 // Where a surface point would be had it moved on as it last did; if that leaves the patch, where it was.
-inline SurfacePoint warm_point(double patch, double u, double v, const double* step, const Shape& shape) {
-  const int p = static_cast<int>(patch);
+inline SurfacePoint warm_point(const PointMemory& m, const Shape& shape) {
+  const int p = static_cast<int>(m.patch);
   if (p < 0 || p >= static_cast<int>(shape.patches.size())) return {};
-  const double on_u = u + step[0], on_v = v + step[1];
-  const bool inside = on_u >= 0 && on_u <= 1 && on_v >= 0 && on_v <= 1;
-  return inside ? SurfacePoint{p, on_u, on_v} : SurfacePoint{p, u, v};
+  const double u = m.u + m.step[0], v = m.v + m.step[1];
+  const bool inside = u >= 0 && u <= 1 && v >= 0 && v <= 1;
+  return inside ? SurfacePoint{p, u, v} : SurfacePoint{p, m.u, m.v};
 }
 // `follows`: what is stored is the point of the solve before.
-inline void remember_point(const SurfacePoint& now, bool follows, double* patch, double* u, double* v,
-                           double* step) {
-  const bool on = follows && *patch == now.patch;
-  step[0] = on ? now.u - *u : 0;
-  step[1] = on ? now.v - *v : 0;
-  *patch = now.patch;
-  *u = now.u;
-  *v = now.v;
+inline void remember_point(const SurfacePoint& now, bool follows, PointMemory* m) {
+  const bool on = follows && m->patch == now.patch;
+  *m = {static_cast<double>(now.patch), now.u, now.v, {on ? now.u - m->u : 0, on ? now.v - m->v : 0}};
 }
 
 // |q - q0| of unit quaternions is 2 sin(angle / 4); a point at distance R from the centre has moved by

@@ -100,14 +100,12 @@ class Ladder {
 
   // Rung 4: Newton from where the contact would be, had it moved on as it last did.
   bool warm(const PairFrame& pair, double tolerance, ContactResult* r) {
-    JointSolution s =
-        solve_joint(pair, warm_point(memory_.patch_a, memory_.u_a, memory_.v_a, memory_.step_a, *pair.a),
-                    warm_point(memory_.patch_b, memory_.u_b, memory_.v_b, memory_.step_b, *pair.b), tolerance,
-                    settings_.reach, kWarmIterations);
+    JointSolution s = solve_joint(pair, warm_point(memory_.on_a, *pair.a), warm_point(memory_.on_b, *pair.b),
+                                  tolerance, settings_.reach, kWarmIterations);
     r->iterations = s.iterations;
     if (!s.converged && !confirm(pair, tolerance, s)) return false;
     const double turned2_a = turned2(a_.q, memory_.q_a), turned2_b = turned2(b_.q, memory_.q_b);
-    *r = finish(pair, s, Rung::warm, s.iterations);
+    *r = finish(pair, s, s.normal, Rung::warm, s.iterations);
     if (r->status == Status::converged) remember_model(pair, s, tolerance, turned2_a, turned2_b);
     return true;
   }
@@ -154,7 +152,7 @@ class Ladder {
       for (; tried < found; ++tried) {
         const JointSolution joint = polish(pair, refine_guess(pair, guesses[tried]), tolerance);
         spent += joint.iterations;
-        if (joint.converged) return finish(pair, joint, Rung::cold, spent);
+        if (joint.converged) return finish(pair, joint, joint.normal, Rung::cold, spent);
         if (!joint.stationary || (have && joint.gap <= best.gap)) continue;
         best = joint;
         have = true;
@@ -183,7 +181,7 @@ class Ladder {
       joint = solve_joint(pair, hull.points.on_a, hull.points.on_b, tolerance, settings_.reach,
                           kPolishIterations);
       spent += joint.iterations;
-      if (joint.converged) return finish(pair, joint, Rung::fallback, spent);
+      if (joint.converged) return finish(pair, joint, joint.normal, Rung::fallback, spent);
       polished =
           joint.stationary && joint.gap <= hull.bracket.upper && joint.gap >= hull.bracket.lower - tolerance;
     }
@@ -194,19 +192,12 @@ class Ladder {
       hull.gap = std::clamp(joint.gap, hull.bracket.lower, hull.bracket.upper);
     }
     hull.converged = hull.bracket.width() <= tolerance;
-    return finish(pair, hull, Rung::fallback, spent);
+    return finish(pair, hull, hull.bracket.direction, Rung::fallback, spent);
   }
 
   template <class Solution>
-  static Vec3 normal_of(const Solution& s) {
-    if constexpr (std::is_same_v<Solution, JointSolution>)
-      return s.normal;
-    else
-      return s.bracket.direction;
-  }
-
-  template <class Solution>
-  ContactResult finish(const PairFrame& pair, const Solution& s, Rung rung, int iterations) {
+  ContactResult finish(const PairFrame& pair, const Solution& s, const Vec3& normal, Rung rung,
+                       int iterations) {
     remember_pose(pair, s.bracket.direction, s.bracket.lower);
     remember_points(s.points);
     ContactResult r;
@@ -215,13 +206,12 @@ class Ladder {
     r.lower = s.bracket.lower;
     r.upper = s.bracket.upper;
     r.gap = s.gap;
-    r.normal = pair.axes_a * normal_of(s);
+    r.normal = pair.axes_a * normal;
     r.point_a = pair.axes_a * s.points.a;
     r.point_b = pair.axes_a * s.points.b;
-    if (s.converged)
-      r.status = r.lower > settings_.reach ? Status::separated : Status::converged;
-    else
-      r.status = r.lower > settings_.reach ? Status::separated : Status::unresolved;
+    r.status = r.lower > settings_.reach ? Status::separated
+               : s.converged             ? Status::converged
+                                         : Status::unresolved;
     if (r.status == Status::separated) r.gap = r.lower;
     return r;
   }
@@ -238,8 +228,8 @@ class Ladder {
   void remember_points(const PointPair& p) {
     const bool follows = memory_.known >= 2;
     memory_.known = 2;  // drops the model
-    remember_point(p.on_a, follows, &memory_.patch_a, &memory_.u_a, &memory_.v_a, memory_.step_a);
-    remember_point(p.on_b, follows, &memory_.patch_b, &memory_.u_b, &memory_.v_b, memory_.step_b);
+    remember_point(p.on_a, follows, &memory_.on_a);
+    remember_point(p.on_b, follows, &memory_.on_b);
   }
 
   // Worth its 50 ns only if bodies that turn as they just did would be served at least once.
@@ -248,18 +238,11 @@ class Ladder {
     if (!(s.turn > 0)) return;
     const double rate_a = pair.scale_a * pair.a->curvature_rate[s.base_a.patch];
     const double rate_b = pair.scale_b * pair.b->curvature_rate[s.base_b.patch];
-    const double third =
-        rate_a * turned2_a * std::sqrt(turned2_a) + rate_b * turned2_b * std::sqrt(turned2_b);
-    if (!(kRemainderSafety * third / 6 <= 0.5 * tolerance)) return;
+    if (!(cubic_remainder(rate_a, turned2_a) + cubic_remainder(rate_b, turned2_b) <= 0.5 * tolerance)) return;
     if (!make_support_model(pair.axes_a, Vec3::Zero(), s.base_a, s.jet_a, rate_a, &memory_.model.a)) return;
     if (!make_support_model(pair.axes_a, pair.offset, s.base_b, s.jet_b, rate_b, &memory_.model.b)) return;
-    // W (d - n) is at least the least curvature radius times the turn.
-    const auto keep_to = [&](const Shape& shape, double scale, SupportModel& m) {
-      if (shape.normal_map.cells > 0)
-        m.room = std::min(m.room, s.turn * scale * shape.patch_curvature.min_radius);
-    };
-    keep_to(*pair.a, pair.scale_a, memory_.model.a);
-    keep_to(*pair.b, pair.scale_b, memory_.model.b);
+    limit_turn(*pair.a, pair.scale_a, s.turn, &memory_.model.a);
+    limit_turn(*pair.b, pair.scale_b, s.turn, &memory_.model.b);
     memory_.unique = 0.5 * s.bracket.unique;
     memory_.known = 3;
   }
@@ -282,17 +265,13 @@ __attribute__((noinline)) ContactResult reference_solver(const Particle& a, cons
   CsoStart start;
   start.valid = memory.known >= 2;
   start.direction = load(memory.direction);
-  start.on_a = {static_cast<int>(memory.patch_a), memory.u_a, memory.v_a};
-  start.on_b = {static_cast<int>(memory.patch_b), memory.u_b, memory.v_b};
+  start.on_a = warm_point(memory.on_a, *a.shape);
+  start.on_b = warm_point(memory.on_b, *b.shape);
   const ContactResult r = solve_cso(a, b, settings.tolerance, &start);
   memory.known = start.valid ? 2 : 0;
   store(start.direction, memory.direction);
-  memory.patch_a = start.on_a.patch;
-  memory.u_a = start.on_a.u;
-  memory.v_a = start.on_a.v;
-  memory.patch_b = start.on_b.patch;
-  memory.u_b = start.on_b.u;
-  memory.v_b = start.on_b.v;
+  remember_point(start.on_a, false, &memory.on_a);
+  remember_point(start.on_b, false, &memory.on_b);
   return r;
 }
 

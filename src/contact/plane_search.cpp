@@ -98,8 +98,7 @@ class PlaneLadder {
   }
 
   bool local(ContactResult* r) const {
-    const LocalSupport s =
-        evaluate_local_support(memory_.model.b, turn_since(particle_.q, memory_.q_a), -normal_);
+    const LocalSupport s = evaluate_local_support(memory_.model.b, particle_.q, memory_.q_a, -normal_);
     if (!(s.valid && s.error <= 0.5 * tolerance_ && s.drift <= kLocalDrift * tolerance_)) return false;
     const double error = s.error + kRoundoff * radius_;
     r->rung = Rung::local_model;
@@ -118,7 +117,7 @@ class PlaneLadder {
 
   bool warm(ContactResult* r) {
     WarmSupport s;
-    const SurfacePoint start = warm_point(memory_.patch_b, memory_.u_b, memory_.v_b, memory_.step_b, shape_);
+    const SurfacePoint start = warm_point(memory_.on_b, shape_);
     if (!solve_warm(shape_, d_, start, settings_.tolerance * shape_.bounding_radius, &s)) return false;
     r->rung = Rung::warm;
     const double turned2_before = turned2(particle_.q, memory_.q_a);
@@ -130,7 +129,7 @@ class PlaneLadder {
   // The support mapping at large: across patches, from the last point or the atlas.
   void search(ContactResult* r) {
     const bool warm = memory_.known >= 2;
-    const SurfacePoint start{static_cast<int>(memory_.patch_b), memory_.u_b, memory_.v_b};
+    const SurfacePoint start{static_cast<int>(memory_.on_b.patch), memory_.on_b.u, memory_.on_b.v};
     r->rung = warm ? Rung::warm : Rung::cold;
     finish(find_hull_support(shape_, d_, warm ? &start : nullptr), r);
   }
@@ -142,7 +141,7 @@ class PlaneLadder {
     const bool follows = memory_.known >= 2;
     memory_.known = 2;
     remember_pose(r->lower);
-    remember_point(s.where, follows, &memory_.patch_b, &memory_.u_b, &memory_.v_b, memory_.step_b);
+    remember_point(s.where, follows, &memory_.on_b);
   }
 
   // From the support along the plane's normal, its bounds and its point.
@@ -168,16 +167,13 @@ class PlaneLadder {
   // only: the model needs no uniqueness, but no dents near either.
   void remember_model(const WarmSupport& s, double turned2_before) {
     const double rate = particle_.scale * shape_.curvature_rate[s.base.patch];
-    const double third = rate * turned2_before * std::sqrt(turned2_before);
-    if (!(kRemainderSafety * third / 6 <= 0.5 * tolerance_)) return;
-    const bool dented = shape_.support_excess > kRoundoff * shape_.bounding_radius;
-    if (dented && !(shape_.normal_map.radius_at(d_) < kFarAway)) return;
+    if (!(cubic_remainder(rate, turned2_before) <= 0.5 * tolerance_)) return;
+    if (shape_.dented() && !(shape_.normal_map.radius_at(d_) < kFarAway)) return;
     JetLanes jet = s.jet;
     scale(particle_.scale, &jet);
     SupportModel& model = memory_.model.b;
     if (!make_support_model(axes_, Vec3::Zero(), s.base, jet, rate, &model)) return;
-    if (shape_.normal_map.cells > 0)  // no turn that may reach another support point
-      model.room = std::min(model.room, kNormalMargin * particle_.scale * shape_.patch_curvature.min_radius);
+    limit_turn(shape_, particle_.scale, kNormalMargin, &model);
     memory_.known = 3;
   }
 

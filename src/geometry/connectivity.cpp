@@ -171,7 +171,7 @@ UnmatchedEdge describe_unmatched(const std::vector<Edge>& edges, const PatchLink
 // Signed angle from the normal of `a` to that of `b` at a common point; positive where b's surface bends
 // away. `along` is the direction in which the edge runs with a's surface on its left, seen from outside.
 double signed_angle(const Vec3& normal_a, const Vec3& normal_b, const Vec3& along) {
-  const double angle = std::atan2(normal_a.cross(normal_b).norm(), normal_a.dot(normal_b));
+  const double angle = angle_between(normal_a, normal_b);
   return along.cross(normal_a).dot(normal_b) >= 0 ? angle : -angle;
 }
 
@@ -242,7 +242,7 @@ double spread_of_normals(const BezierPatch& patch, int edge, double inset) {
   }
   double spread = 0;
   for (const Vec3& a : normal) {
-    for (const Vec3& b : normal) spread = std::max(spread, std::atan2(a.cross(b).norm(), a.dot(b)));
+    for (const Vec3& b : normal) spread = std::max(spread, angle_between(a, b));
   }
   return spread;
 }

@@ -38,7 +38,7 @@ Node node_at(const BezierPatch& patch, double u, double v) {
 
 // |W_b - Q W_a Q'| per radian, Q the shortest turn of a's normal into b's.
 double quotient(const Node& a, const Node& b) {
-  const double angle = std::atan2(a.normal.cross(b.normal).norm(), a.normal.dot(b.normal));
+  const double angle = angle_between(a.normal, b.normal);
   if (!(angle > 0)) return 0;
   const Mat3 q = Quat::FromTwoVectors(a.normal, b.normal).toRotationMatrix();
   return (b.w - q * a.w * q.transpose()).norm() / angle;

@@ -1,33 +1,15 @@
-// Nodes of the cube map: face 2k looks along +axis k, face 2k + 1 along -axis k; a node's direction is the
-// axis plus a * next axis + b * next-next axis, a and b uniform in [-1, 1].
+// Nodes of the cube map (cube_map.h): a and b uniform in [-1, 1] on every face.
 #include "geometry/direction_atlas.h"
 
 #include <algorithm>
 #include <cmath>
 
+#include "geometry/cube_map.h"
 #include "geometry/shape.h"
 #include "geometry/support.h"
 #include "geometry/tolerances.h"
 
 namespace nurbs {
-namespace {
-
-// Face of d and its coordinates there, d = major * (axis + a e1 + b e2).
-struct CubePoint {
-  int face;
-  double major, a, b;
-};
-
-CubePoint to_cube(const Vec3& d) {
-  const double x = std::abs(d[0]), y = std::abs(d[1]), z = std::abs(d[2]);
-  const int k = x >= y ? (x >= z ? 0 : 2) : (y >= z ? 1 : 2);
-  const int k1 = k == 2 ? 0 : k + 1, k2 = k == 0 ? 2 : k - 1;
-  const double major = std::abs(d[k]);
-  return {2 * k + (d[k] < 0), major, d[k1] / major, d[k2] / major};
-}
-
-}  // namespace
-
 Vec3 DirectionAtlas::direction(int node) const {
   const int n = cells + 1;
   const int face = node / (n * n), i = node / n % n, j = node % n;
@@ -50,9 +32,7 @@ int DirectionAtlas::nearest(const Vec3& d) const {
 
 void DirectionAtlas::cell(const Vec3& d, int (&nodes)[4]) const {
   const CubePoint c = to_cube(d);
-  const double half = 0.5 * cells;
-  const int i = std::clamp(static_cast<int>((c.a + 1) * half), 0, cells - 1);
-  const int j = std::clamp(static_cast<int>((c.b + 1) * half), 0, cells - 1);
+  const int i = cube_cell(c.a, cells), j = cube_cell(c.b, cells);
   const int first = (c.face * (cells + 1) + i) * (cells + 1) + j;
   nodes[0] = first;
   nodes[1] = first + 1;

@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "geometry/connectivity.h"
+#include "geometry/cube_map.h"
 #include "geometry/curvature.h"
 #include "geometry/local_form.h"
 #include "geometry/shape.h"
@@ -14,11 +15,6 @@ namespace nurbs {
 namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
-
-// Cell number of a coordinate on its cube face.
-int cell_of(double x, int cells) {
-  return std::clamp(static_cast<int>(0.5 * (x + 1) * cells), 0, cells - 1);
-}
 
 // Raises the radius of every cell that a cap of directions may touch.
 void paint(const Vec3& center, double angle, double radius, NormalMap& map) {
@@ -31,14 +27,10 @@ void paint(const Vec3& center, double angle, double radius, NormalMap& map) {
       const double reach = 1.3 * angle * (1 + a * a + b * b);
       if (std::abs(a) - reach > 1 || std::abs(b) - reach > 1) continue;
       float* face = map.radius.data() + (2 * k + (side < 0)) * map.cells * map.cells;
-      for (int i = cell_of(a - reach, map.cells); i <= cell_of(a + reach, map.cells); ++i)
-        for (int j = cell_of(b - reach, map.cells); j <= cell_of(b + reach, map.cells); ++j)
+      for (int i = cube_cell(a - reach, map.cells); i <= cube_cell(a + reach, map.cells); ++i)
+        for (int j = cube_cell(b - reach, map.cells); j <= cube_cell(b + reach, map.cells); ++j)
           face[i * map.cells + j] = std::max(face[i * map.cells + j], value);
     }
-}
-
-double angle_between(const Vec3& a, const Vec3& b) {
-  return std::atan2(a.cross(b).norm(), a.dot(b));
 }
 
 class Painter {
@@ -109,19 +101,14 @@ class Painter {
 
 double NormalMap::radius_at(const Vec3& n) const {
   if (cells == 0) return kInfinity;
-  const double x = std::abs(n[0]), y = std::abs(n[1]), z = std::abs(n[2]);
-  const int k = x >= y ? (x >= z ? 0 : 2) : (y >= z ? 1 : 2);
-  const int k1 = k == 2 ? 0 : k + 1, k2 = k == 0 ? 2 : k - 1;
-  const double r = 1 / std::abs(n[k]);
-  const int face = 2 * k + (n[k] < 0);
-  if (!(r < 2)) return kInfinity;
-  return radius[(face * cells + cell_of(r * n[k1], cells)) * cells + cell_of(r * n[k2], cells)];
+  const CubePoint c = to_cube(n);
+  if (!(c.major > 0.5)) return kInfinity;  // no unit vector
+  return radius[(c.face * cells + cube_cell(c.a, cells)) * cells + cube_cell(c.b, cells)];
 }
 
 void build_normal_map(Shape& shape) {
   NormalMap& map = shape.normal_map;
-  const bool dented = shape.support_excess > kRoundoff * shape.bounding_radius;
-  if (!dented && shape.patch_curvature.max_radius <= kLongRadius * shape.bounding_radius) return;
+  if (!shape.dented() && shape.patch_curvature.max_radius <= kLongRadius * shape.bounding_radius) return;
   map.cells = kNormalCells;
   map.radius.assign(6u * kNormalCells * kNormalCells, 0);
   Painter painter(shape);

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <array>
+#include <cmath>
 #include <vector>
 
 #include "geometry/direction_atlas.h"
@@ -28,6 +29,15 @@ struct JointDistance {
 struct RollingRadii {
   double inner, outer, slack, near;
 };
+
+// How far a ball of radius `outer` that touches at x rises above d.x, for |d - n|^2 = chord2: outer (1 -
+// d.n); where that is infinite (flats, grooves), at most the slope of the tangent plane times the body's
+// diameter.
+inline double rolling_excess(double outer, double bounding_radius, double chord2) {
+  const double rolling = 0.5 * outer * chord2;  // NaN on a flat met square
+  const double wedge = 2 * bounding_radius * std::sqrt(chord2);
+  return rolling < wedge ? rolling : wedge;
+}
 
 // Fills shape.joints from links, patches and curvatures.
 void measure_joint_distance(Shape& shape);

@@ -15,6 +15,7 @@
 #include "geometry/normal_map.h"
 #include "geometry/nurbs_surface.h"
 #include "geometry/rolling.h"
+#include "geometry/tolerances.h"
 #include "geometry/types.h"
 
 namespace nurbs {
@@ -68,6 +69,9 @@ struct Shape {
   JointDistance joints;                    // to kinked joints: where the patch curvatures hold for the body
   NormalMap normal_map;                    // local bounds, for bodies with flats or dents
   DirectionAtlas atlas;
+
+  // Whether a local maximum of d . x may be no global one.
+  bool dented() const { return support_excess > kRoundoff * bounding_radius; }
 };
 
 // What make_shape accepts, relative to the diagonal of the body's box (gap) or to its bounding radius

@@ -218,13 +218,9 @@ bool find_pole(const Shape& shape, int patch, SurfacePoint* pole) {
   return false;
 }
 
-// h(d) over d . (surface point), from the point's normal n: P (1 - d.n) by the ball that rolls around the
-// body, or the slope of the tangent plane times the diameter.
+// h(d) over d . (surface point), from the point's normal n.
 double excess_of(const Shape& shape, const Vec3& d, const Vec3& n) {
-  const double chord2 = (d - n).squaredNorm();
-  const double rolling = 0.5 * shape.curvature.max_radius * chord2;  // NaN on a flat met square
-  const double wedge = 2 * shape.bounding_radius * std::sqrt(chord2);
-  return rolling < wedge ? rolling : wedge;
+  return rolling_excess(shape.curvature.max_radius, shape.bounding_radius, (d - n).squaredNorm());
 }
 
 // Next to a pole normals are lost to round-off. The bound then comes from a surface point a little further
@@ -341,19 +337,16 @@ Support find_support(const Shape& shape, const Vec3& d, const SurfacePoint* star
 }
 
 Support find_hull_support(const Shape& shape, const Vec3& d, const SurfacePoint* start) {
-  if (shape.support_excess <= kRoundoff * shape.bounding_radius) return find_support(shape, d, start);
-  // No dent near d: the only point with this normal.
+  Support best = find_support(shape, d, start);
+  if (!shape.dented()) return best;
   const double radius = shape.normal_map.radius_at(d);
-  if (radius < kFarAway) {
-    Support only = find_support(shape, d, start);
-    if (only.converged) {
-      only.upper = only.h + radius * only.slope * only.slope + kRoundoff * shape.bounding_radius;
-      if (only.slope < 0.5 * kNormalMargin) return only;
-    }
+  if (radius < kFarAway && best.converged && best.slope < 0.5 * kNormalMargin) {
+    // No dent near d: the only point with this normal.
+    best.upper = best.h + radius * best.slope * best.slope + kRoundoff * shape.bounding_radius;
+    return best;
   }
   int nodes[4];
   shape.atlas.cell(d, nodes);
-  Support best = find_support(shape, d, start ? start : &shape.atlas.where[nodes[0]]);
   for (const int node : nodes) {
     const Support other = find_support(shape, d, &shape.atlas.where[node]);
     const int iterations = best.iterations + other.iterations;

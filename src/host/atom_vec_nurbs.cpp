@@ -4,7 +4,6 @@
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
-#include <cstring>
 #include <limits>
 #include <vector>
 
@@ -180,13 +179,12 @@ void AtomVecNurbs::init() {
 
 // The host inserts when a run begins, after init.
 void AtomVecNurbs::refuse_insertion() {
-  for (int k = 0; k < modify->nfix; ++k)
-    if (std::strncmp(modify->fix[k]->style, "insert/", 7) == 0)
-      nurbs_host::fail_all(
-          FLERR, lmp,
-          std::string("Fix ") + modify->fix[k]->style +
-              " inserts spheres and can't be used with atom_style nurbs; give the particles in "
-              "a data file (read_data) or by create_atoms");
+  if (const char* style = nurbs_host::fix_style_with(lmp, "insert/"))
+    nurbs_host::fail_all(
+        FLERR, lmp,
+        std::string("Fix ") + style +
+            " inserts spheres and can't be used with atom_style nurbs; give the particles in "
+            "a data file (read_data) or by create_atoms");
 }
 
 // The host's `set` command treats a particle as a sphere. `set diameter` (of the bounding sphere) means a

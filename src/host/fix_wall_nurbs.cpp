@@ -120,8 +120,7 @@ void FixWallNurbs::warn_time_step() {
   const std::string warning = std::string("Fix wall/nurbs ") + id + ": time step " +
                               nurbs_host::show(update->dt) + " does not resolve its contacts; use " +
                               nurbs_host::show(step) + " or less";
-  if (warning != last_warning_) nurbs_host::warn(FLERR, lmp, warning);
-  last_warning_ = warning;
+  nurbs_host::warn_news(FLERR, lmp, warning, last_warning_);
 }
 
 void FixWallNurbs::setup(int vflag) {

@@ -5,10 +5,13 @@
 
 #include <cstdio>
 #include <cstdlib>
+#include <cstring>
 
 #include "comm.h"
 #include "error.h"
+#include "fix.h"
 #include "lammps.h"
+#include "modify.h"
 
 namespace LAMMPS_NS::nurbs_host {
 
@@ -29,6 +32,18 @@ void fail_one(LAMMPS* lmp, const std::string& message) {
 
 void warn(const char* file, int line, LAMMPS* lmp, const std::string& message) {
   if (lmp->comm->me == 0) lmp->error->warning(file, line, message.c_str());
+}
+
+void warn_news(const char* file, int line, LAMMPS* lmp, const std::string& message, std::string& last) {
+  if (message != last) warn(file, line, lmp, message);
+  last = message;
+}
+
+const char* fix_style_with(const LAMMPS* lmp, const char* prefix) {
+  for (int k = 0; k < lmp->modify->nfix; ++k)
+    if (std::strncmp(lmp->modify->fix[k]->style, prefix, std::strlen(prefix)) == 0)
+      return lmp->modify->fix[k]->style;
+  return nullptr;
 }
 
 std::string show(double value) {

@@ -143,8 +143,7 @@ void DeepContacts::warn(LAMMPS* lmp, const std::string& user, const std::string&
                 "contacts deeper than %g %% of the bounding radius: %.0f, deepest %.3g %%", 100 * kDepth,
                 all.count, 100 * all.deepest);
   const std::string warning = user + ": at the start of the run " + numbers + "; " + hint;
-  if (warning != last) nurbs_host::warn(FLERR, lmp, warning);
-  last = warning;
+  warn_news(FLERR, lmp, warning, last);
 }
 
 bool touches(const ContactResult& result) {

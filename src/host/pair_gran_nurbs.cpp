@@ -118,12 +118,10 @@ void PairGranNurbs::require_host_settings() {
 }
 
 void PairGranNurbs::refuse_sphere_features() {
-  for (int k = 0; k < modify->nfix; ++k)
-    for (const Refused& refused : kRefused)
-      if (std::strncmp(modify->fix[k]->style, refused.prefix, std::strlen(refused.prefix)) == 0)
-        fail_all(FLERR, lmp,
-                 std::string("Fix ") + modify->fix[k]->style + " can't be used with pair_style gran/nurbs" +
-                     refused.instead);
+  for (const Refused& refused : kRefused)
+    if (const char* style = nurbs_host::fix_style_with(lmp, refused.prefix))
+      fail_all(FLERR, lmp,
+               std::string("Fix ") + style + " can't be used with pair_style gran/nurbs" + refused.instead);
   ComputePairGranLocal* local = cpl();
   if (local == nullptr) return;
   if (local->offset_fn() >= 0 || local->offset_ft() >= 0 || local->offset_torquen() >= 0 ||
@@ -196,8 +194,7 @@ void PairGranNurbs::warn_time_step() {
   const std::string warning = "Pair gran/nurbs: time step " + nurbs_host::show(update->dt) +
                               " does not resolve contacts of types " + std::to_string(first) + " and " +
                               std::to_string(second) + "; use " + nurbs_host::show(shortest) + " or less";
-  if (warning != last_warning_) nurbs_host::warn(FLERR, lmp, warning);
-  last_warning_ = warning;
+  nurbs_host::warn_news(FLERR, lmp, warning, last_warning_);
 }
 
 PairGranNurbs::Neighbours PairGranNurbs::order(int i, int j) const {

@@ -338,6 +338,7 @@ size_t memory(const Shape& shape) {
   }
   for (const BezierPatch& p : shape.patches) bytes += sizeof p + sizeof(Vec4) * p.points.size();
   const size_t atlas_node = sizeof(double) + sizeof(Vec3) + sizeof(SurfacePoint);
+  bytes += sizeof(float) * shape.normal_map.radius.size();
   return bytes + sizeof(shape.links[0]) * shape.links.size() + atlas_node * shape.atlas.support.size();
 }
 

@@ -52,6 +52,33 @@ inline std::vector<ShapePointer> all_shapes() {
   return {sphere(), ellipsoid(), disc(), smooth_pebble(), polar(), kinked(), cuboid()};
 }
 
+// Local maxima of d . x from starts all over the surface: the highest, and the next one elsewhere.
+struct Maxima {
+  double best = -1e300, rival = -1e300;
+};
+inline Maxima all_maxima(const Shape& shape, const Vec3& d) {
+  Maxima found;
+  Vec3 point = Vec3::Zero();
+  for (size_t p = 0; p < shape.patches.size(); ++p)
+    for (const double u : {0.1, 0.5, 0.9})
+      for (const double v : {0.1, 0.5, 0.9}) {
+        const SurfacePoint start{static_cast<int>(p), u, v};
+        const Support s = find_support(shape, d, &start);
+        const bool elsewhere = (s.point - point).norm() > 1e-5;
+        if (s.h > found.best) {
+          if (elsewhere) found.rival = found.best;
+          found.best = s.h;
+          point = s.point;
+        } else if (elsewhere) {
+          found.rival = std::max(found.rival, s.h);
+        }
+      }
+  return found;
+}
+inline double exhaustive_support(const Shape& shape, const Vec3& d) {
+  return all_maxima(shape, d).best;
+}
+
 class Random {
  public:
   explicit Random(unsigned seed) : engine_(seed) {}
@@ -96,10 +123,9 @@ inline Pair random_pair(Random& random, const Shape& sa, const Shape& sb, double
 }
 
 // p(d) = h_A(d) + h_B(-d) - d . (x_B - x_A), d in the lab.
-inline double overlap_along(const Pair& pair, const Vec3& d) {
-  return pair.a.scale * find_hull_support(*pair.a.shape, pair.a.q.conjugate() * d).h +
-         pair.b.scale * find_hull_support(*pair.b.shape, pair.b.q.conjugate() * -d).h -
-         d.dot(pair.b.x - pair.a.x);
+inline double overlap_along(const Particle& a, const Particle& b, const Vec3& d) {
+  return a.scale * find_hull_support(*a.shape, a.q.conjugate() * d).h +
+         b.scale * find_hull_support(*b.shape, b.q.conjugate() * -d).h - d.dot(b.x - a.x);
 }
 
 }  // namespace nurbs::test

@@ -188,9 +188,10 @@ TEST(Ladder, deep_overlap_is_the_global_minimum) {
       const Pair pair = random_pair(random, *shape, *ellipsoid(), random.uniform(-1, -0.2));
       const ContactResult r = full_solve(pair, 1e-6);
       double least = 1e300;
-      for (int i = 0; i < 400; ++i) least = std::min(least, overlap_along(pair, random.direction()));
+      for (int i = 0; i < 400; ++i)
+        least = std::min(least, overlap_along(pair.a, pair.b, random.direction()));
       ASSERT_LE(-r.upper, least + 1e-9) << shape->name;  // nothing sampled beats it
-      ASSERT_NEAR(overlap_along(pair, r.normal), -r.gap, 2e-6) << shape->name;
+      ASSERT_NEAR(overlap_along(pair.a, pair.b, r.normal), -r.gap, 2e-6) << shape->name;
     }
 }
 

@@ -9,33 +9,6 @@ namespace {
 
 using namespace test;
 
-// Local maxima of d . x from starts all over the surface: the highest, and the next one elsewhere.
-struct Maxima {
-  double best = -1e300, rival = -1e300;
-};
-Maxima all_maxima(const Shape& shape, const Vec3& d) {
-  Maxima found;
-  Vec3 point = Vec3::Zero();
-  for (size_t p = 0; p < shape.patches.size(); ++p)
-    for (const double u : {0.1, 0.5, 0.9})
-      for (const double v : {0.1, 0.5, 0.9}) {
-        const SurfacePoint start{static_cast<int>(p), u, v};
-        const Support s = find_support(shape, d, &start);
-        const bool elsewhere = (s.point - point).norm() > 1e-5;
-        if (s.h > found.best) {
-          if (elsewhere) found.rival = found.best;
-          found.best = s.h;
-          point = s.point;
-        } else if (elsewhere) {
-          found.rival = std::max(found.rival, s.h);
-        }
-      }
-  return found;
-}
-double exhaustive_support(const Shape& shape, const Vec3& d) {
-  return all_maxima(shape, d).best;
-}
-
 ShapePointer blocky() {  // flats dented and joints kinked by the fit
   static const ShapePointer s = make_shape("blocky", fitted_superellipsoid(Vec3(1, 0.9, 0.8), 4, 3));
   return s;

@@ -8,17 +8,6 @@ namespace {
 
 using namespace test;
 
-double exhaustive_support(const Shape& shape, const Vec3& d) {
-  double best = -1e300;
-  for (size_t p = 0; p < shape.patches.size(); ++p)
-    for (const double u : {0.1, 0.5, 0.9})
-      for (const double v : {0.1, 0.5, 0.9}) {
-        const SurfacePoint start{static_cast<int>(p), u, v};
-        best = std::max(best, find_support(shape, d, &start).h);
-      }
-  return best;
-}
-
 TEST(Support, equals_the_closed_form_on_ellipsoids) {
   Random random(1);
   const Vec3 axes(1, 0.8, 0.6);
