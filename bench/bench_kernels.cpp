@@ -12,10 +12,10 @@
 
 #include "bench/bodies.h"
 #include "bench/machine.h"
+#include "body/support.h"
 #include "contact/direction_search.h"
 #include "contact/pair_search.h"
-#include "geometry/bezier_patch.h"
-#include "geometry/support.h"
+#include "nurbs/bezier_patch.h"
 
 namespace nurbs::bench {
 namespace {
@@ -223,7 +223,7 @@ void turning(benchmark::State& state, int which, Solver solver) {
     }
     state.SetIterationTime(std::max(1e-9, (thread_seconds() - start - clock_cost())) / (kSteps - 2));
   }
-  if (solver == Solver::ours) state.counters["warm share"] = static_cast<double>(warm) / all;
+  if (solver == Solver::ladder) state.counters["warm share"] = static_cast<double>(warm) / all;
 }
 
 // A body that turns `turn` rad a step, half sunk into a plane. One iteration is one whole path.
@@ -330,7 +330,7 @@ std::vector<std::string> register_all() {
     add("skipped by budget", [=](benchmark::State& s) { budget(s, which); });
     add("rejected by bounds", [=](benchmark::State& s) { bounds(s, which); });
     add("resting", [=](benchmark::State& s) { resting(s, which); });
-    add("turning 2e-3", [=](benchmark::State& s) { turning(s, which, Solver::ours); })
+    add("turning 2e-3", [=](benchmark::State& s) { turning(s, which, Solver::ladder); })
         ->UseManualTime()
         ->Iterations(kPaths);
     add("turning 2e-3 cso", [=](benchmark::State& s) { turning(s, which, Solver::cso); })
@@ -342,7 +342,7 @@ std::vector<std::string> register_all() {
     add("plane, resting", [=](benchmark::State& s) { plane(s, which, kRest); })
         ->UseManualTime()
         ->Iterations(kPaths);
-    add("cold", [=](benchmark::State& s) { cold(s, which, Solver::ours); });
+    add("cold", [=](benchmark::State& s) { cold(s, which, Solver::ladder); });
     add("cold cso", [=](benchmark::State& s) { cold(s, which, Solver::cso); });
   }
   return names;

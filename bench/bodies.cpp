@@ -3,9 +3,9 @@
 
 #include <algorithm>
 
+#include "body/support.h"
 #include "contact/pair_search.h"
-#include "geometry/primitives.h"
-#include "geometry/support.h"
+#include "shapes/primitives.h"
 
 namespace nurbs::bench {
 namespace {

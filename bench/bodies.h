@@ -6,8 +6,8 @@
 #include <string>
 #include <vector>
 
+#include "body/shape.h"
 #include "contact/contact.h"
-#include "geometry/shape.h"
 
 namespace nurbs::bench {
 

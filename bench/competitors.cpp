@@ -13,9 +13,9 @@
 #include "bench/bodies.h"
 #include "bench/fcl_meshes.h"
 #include "bench/meshes.h"
+#include "body/support.h"
 #include "contact/pair_search.h"
-#include "geometry/primitives.h"
-#include "geometry/support.h"
+#include "shapes/primitives.h"
 
 namespace nurbs::bench {
 namespace {
@@ -336,7 +336,7 @@ double mesh_error(const Shape& shape, const Mesh& mesh) {
 }
 
 std::unique_ptr<Method> make_ours(double tolerance, bool warm) {
-  return std::make_unique<Ladder>(Solver::ours, tolerance, warm);
+  return std::make_unique<Ladder>(Solver::ladder, tolerance, warm);
 }
 std::unique_ptr<Method> make_cso(double tolerance, bool warm) {
   return std::make_unique<Ladder>(Solver::cso, tolerance, warm);

@@ -15,7 +15,7 @@
 #include "bench/bodies.h"
 #include "bench/machine.h"
 #include "contact/pair_search.h"
-#include "geometry/primitives.h"
+#include "shapes/primitives.h"
 
 namespace nurbs {
 namespace {

@@ -42,7 +42,7 @@ std::vector<Entry> all_methods() {
   std::vector<Entry> entries;
   const auto add = [&](const std::string& name, long most,
                        std::function<std::unique_ptr<bench::Method>()> make) {
-    entries.push_back({name, most, std::move(make), Solver::ours, nullptr, {}});
+    entries.push_back({name, most, std::move(make), Solver::ladder, nullptr, {}});
   };
   add("ours", 1000000, nullptr);
   add("cso", 10000, nullptr);

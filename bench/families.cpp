@@ -9,10 +9,10 @@
 
 #include "../tests/core/bodies.h"
 #include "../tests/core/ellipsoid_oracle.h"
+#include "body/support.h"
 #include "contact/pair_search.h"
-#include "geometry/primitives.h"
-#include "geometry/support.h"
-#include "geometry/tolerances.h"
+#include "nurbs/tolerances.h"
+#include "shapes/primitives.h"
 
 namespace nurbs::families {
 
@@ -751,7 +751,7 @@ Answer solve(const PairCase& c, Solver solver) {
   answer.normal = r.normal;
   answer.point_a = r.point_a;
   answer.point_b = r.point_b;
-  answer.has_bracket = solver == Solver::ours;
+  answer.has_bracket = solver == Solver::ladder;
   answer.rung = static_cast<int>(r.rung);
   answer.lower = r.lower;
   answer.upper = r.upper;

@@ -7,7 +7,7 @@
 #include <unordered_map>
 #include <utility>
 
-#include "geometry/bezier_patch.h"
+#include "nurbs/bezier_patch.h"
 
 namespace nurbs::bench {
 namespace {

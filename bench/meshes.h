@@ -4,7 +4,7 @@
 #include <array>
 #include <vector>
 
-#include "geometry/shape.h"
+#include "body/shape.h"
 
 namespace nurbs::bench {
 

@@ -1,6 +1,6 @@
 // The certificate: rigorous bounds on the gap from one pair of surface points, whatever way they were found.
 //
-// Let every normal curvature radius of body K lie in [rho_K, P_K] (near kinked joints: geometry/rolling.h).
+// Let every normal curvature radius of body K lie in [rho_K, P_K] (near kinked joints: body/rolling.h).
 // By Blaschke's rolling theorem a ball of radius rho_K rolls freely inside K, and K rolls freely inside a
 // ball of radius P_K. Hence, for a on A with outward normal na and b on B with nb:
 //   * a' = a - rho_A na and b' = b - rho_B nb lie in the inner parallel bodies ("cores") of A and B. As
@@ -20,7 +20,7 @@
 #include <limits>
 
 #include "contact/pair_frame.h"
-#include "geometry/tolerances.h"
+#include "nurbs/tolerances.h"
 
 namespace nurbs {
 

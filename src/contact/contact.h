@@ -4,8 +4,8 @@
 
 #include <limits>
 
-#include "geometry/shape.h"
-#include "geometry/types.h"
+#include "body/shape.h"
+#include "nurbs/types.h"
 
 namespace nurbs {
 
@@ -38,10 +38,10 @@ struct ContactResult {
   int iterations = 0;           // Newton iterations spent
 };
 
-enum class Solver { ours, cso };
+enum class Solver { ladder, cso };
 
 struct ContactSettings {
-  Solver solver = Solver::ours;
+  Solver solver = Solver::ladder;
   double tolerance = 1e-9;  // error allowed in the gap, relative to the smaller bounding radius
   // A pair proven further apart than this (length) needs no more: its gap is then a lower bound, its points
   // and normal are not set. The host asks 0: only contacts matter. Infinity asks for the full answer always.

@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "geometry/tolerances.h"
+#include "nurbs/tolerances.h"
 
 namespace nurbs {
 namespace {

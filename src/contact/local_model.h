@@ -18,7 +18,7 @@
 #include <cmath>
 
 #include "contact/pair_frame.h"
-#include "geometry/tolerances.h"
+#include "nurbs/tolerances.h"
 
 namespace nurbs {
 

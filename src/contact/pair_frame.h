@@ -2,8 +2,8 @@
 // Solving there keeps the digits of a pair far from the lab's origin, and gives every rank the same bits.
 #pragma once
 
+#include "body/support.h"
 #include "contact/contact.h"
-#include "geometry/support.h"
 
 namespace nurbs {
 

@@ -3,12 +3,12 @@
 
 #include <cmath>
 
-#include "contact/cso.h"
 #include "contact/direction_search.h"
 #include "contact/joint_newton.h"
 #include "contact/pair_frame.h"
 #include "contact/pair_memory.h"
 #include "contact/polytope.h"
+#include "reference/cso.h"
 
 namespace nurbs {
 namespace {

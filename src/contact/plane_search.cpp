@@ -6,7 +6,7 @@
 #include "contact/certificate.h"
 #include "contact/pair_memory.h"
 #include "contact/pair_search.h"
-#include "geometry/tolerances.h"
+#include "nurbs/tolerances.h"
 
 namespace nurbs {
 namespace {

@@ -16,10 +16,10 @@
 #include <utility>
 #include <vector>
 
-#include "geometry/affine.h"
-#include "geometry/primitives.h"
-#include "geometry/shape.h"
-#include "geometry/shape_file.h"
+#include "body/shape.h"
+#include "io/shape_file.h"
+#include "nurbs/affine.h"
+#include "shapes/primitives.h"
 
 namespace {
 

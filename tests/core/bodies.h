@@ -7,10 +7,10 @@
 #include <string>
 #include <vector>
 
+#include "body/shape.h"
+#include "body/support.h"
 #include "contact/contact.h"
-#include "geometry/primitives.h"
-#include "geometry/shape.h"
-#include "geometry/support.h"
+#include "shapes/primitives.h"
 
 namespace nurbs::test {
 

@@ -5,8 +5,8 @@
 #include <cmath>
 #include <random>
 
-#include "mechanics/contact_law.h"
-#include "mechanics/rotation.h"
+#include "laws/contact_law.h"
+#include "motion/rotation.h"
 
 namespace {
 

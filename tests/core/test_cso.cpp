@@ -8,12 +8,12 @@
 #include <new>
 #include <random>
 
-#include "contact/cso.h"
-#include "contact/cso_derivatives.h"
-#include "contact/trust_region.h"
-#include "geometry/primitives.h"
-#include "geometry/shape.h"
-#include "geometry/support.h"
+#include "body/shape.h"
+#include "body/support.h"
+#include "reference/cso.h"
+#include "reference/cso_derivatives.h"
+#include "reference/trust_region.h"
+#include "shapes/primitives.h"
 
 namespace {
 std::size_t allocations = 0;

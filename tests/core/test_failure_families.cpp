@@ -9,8 +9,8 @@
 #include <utility>
 
 #include "../../bench/families.h"
+#include "body/support.h"
 #include "contact/contact.h"
-#include "geometry/support.h"
 
 namespace nurbs::families {
 namespace {
@@ -30,7 +30,7 @@ TEST(FailureFamilies, no_answer_of_ours_fails) {
   for (const Family& family : all_families())
     for (long k = 0; k < sample_of(family); ++k) {
       const PairCase pair = pair_of(family, k);
-      const Verdict verdict = judge(pair, solve(pair, Solver::ours));
+      const Verdict verdict = judge(pair, solve(pair, Solver::ladder));
       EXPECT_EQ(verdict.failure, Failure::none)
           << family.name << ", pair " << k << ": " << kFailureNames[static_cast<int>(verdict.failure)]
           << ", error " << verdict.error << ", allowed " << verdict.allowed;
@@ -50,7 +50,7 @@ TEST(FailureFamilies, pairs_that_once_failed) {
       {"near planar", 22991}, {"near planar", 44637}, {"near planar", 79401}};
   for (const auto& [name, k] : once) {
     const PairCase pair = pair_of(family_named(name), k);
-    EXPECT_EQ(judge(pair, solve(pair, Solver::ours)).failure, Failure::none) << name << ", pair " << k;
+    EXPECT_EQ(judge(pair, solve(pair, Solver::ladder)).failure, Failure::none) << name << ", pair " << k;
   }
 }
 
@@ -96,7 +96,7 @@ class Judge : public testing::Test {
   void SetUp() override {
     const Family& slender = all_families().front();
     for (long k = 0; pair.truth.gap > -1e-4; ++k) pair = pair_of(slender, k);
-    good = solve(pair, Solver::ours);
+    good = solve(pair, Solver::ladder);
     ASSERT_EQ(judge(pair, good).failure, Failure::none);
     allowed = judge(pair, good).allowed;
   }

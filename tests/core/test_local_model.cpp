@@ -4,7 +4,7 @@
 #include <random>
 
 #include "contact/pair_search.h"
-#include "geometry/primitives.h"
+#include "shapes/primitives.h"
 
 namespace nurbs {
 namespace {

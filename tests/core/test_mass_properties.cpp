@@ -5,8 +5,8 @@
 #include <cmath>
 #include <random>
 
-#include "geometry/mass_properties.h"
-#include "geometry/primitives.h"
+#include "body/mass_properties.h"
+#include "shapes/primitives.h"
 
 namespace nurbs {
 namespace {

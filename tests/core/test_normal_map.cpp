@@ -2,7 +2,7 @@
 #include <gtest/gtest.h>
 
 #include "bodies.h"
-#include "geometry/tolerances.h"
+#include "nurbs/tolerances.h"
 
 namespace nurbs {
 namespace {

@@ -5,7 +5,7 @@
 #include <limits>
 #include <random>
 
-#include "geometry/nurbs_surface.h"
+#include "nurbs/nurbs_surface.h"
 
 namespace nurbs {
 namespace {

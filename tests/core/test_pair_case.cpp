@@ -6,8 +6,8 @@
 #include <fstream>
 
 #include "bodies.h"
-#include "contact/pair_case.h"
 #include "contact/pair_search.h"
+#include "io/pair_case.h"
 
 namespace nurbs {
 namespace {

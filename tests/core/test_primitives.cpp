@@ -6,12 +6,12 @@
 #include <functional>
 #include <random>
 
-#include "geometry/affine.h"
-#include "geometry/local_form.h"
-#include "geometry/primitives.h"
-#include "geometry/shape.h"
-#include "geometry/shape_file.h"
-#include "geometry/support.h"
+#include "body/local_form.h"
+#include "body/shape.h"
+#include "body/support.h"
+#include "io/shape_file.h"
+#include "nurbs/affine.h"
+#include "shapes/primitives.h"
 
 namespace nurbs {
 namespace {

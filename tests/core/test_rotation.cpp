@@ -9,8 +9,8 @@
 #include <random>
 #include <vector>
 
-#include "mechanics/free_rotor.h"
-#include "mechanics/rotation.h"
+#include "motion/free_rotor.h"
+#include "motion/rotation.h"
 
 namespace nurbs {
 namespace {

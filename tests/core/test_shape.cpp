@@ -6,9 +6,9 @@
 #include <limits>
 #include <random>
 
-#include "geometry/connectivity.h"
-#include "geometry/primitives.h"
-#include "geometry/shape.h"
+#include "body/connectivity.h"
+#include "body/shape.h"
+#include "shapes/primitives.h"
 
 namespace nurbs {
 namespace {

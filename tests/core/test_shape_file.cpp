@@ -9,8 +9,8 @@
 #include <nlohmann/json.hpp>
 #include <random>
 
-#include "geometry/primitives.h"
-#include "geometry/shape_file.h"
+#include "io/shape_file.h"
+#include "shapes/primitives.h"
 
 namespace nurbs {
 namespace {

@@ -12,12 +12,12 @@
 #include <utility>
 #include <vector>
 
-#include "contact/cso.h"
+#include "body/shape.h"
+#include "body/support.h"
 #include "contact/pair_search.h"
 #include "ellipsoid_oracle.h"
-#include "geometry/primitives.h"
-#include "geometry/shape.h"
-#include "geometry/support.h"
+#include "reference/cso.h"
+#include "shapes/primitives.h"
 
 namespace nurbs {
 namespace {

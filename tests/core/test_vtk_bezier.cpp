@@ -5,8 +5,8 @@
 #include <set>
 #include <vector>
 
-#include "geometry/bezier_patch.h"
-#include "geometry/vtk_bezier.h"
+#include "io/vtk_bezier.h"
+#include "nurbs/bezier_patch.h"
 
 namespace nurbs {
 namespace {

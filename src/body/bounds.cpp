@@ -1,0 +1,159 @@
+// Branch and bound on Bernstein coefficients of the squared distance from the origin.
+#include "body/bounds.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <queue>
+
+namespace nurbs {
+namespace {
+
+constexpr double kRelativeWidth = 1e-6;  // of the squared radius, at which a bound is tight enough
+constexpr int kMaxSplits = 4000;
+constexpr double kRoundOff = 1e-13;  // relative, of products and halvings of the coefficients
+
+// The field num / den over a rectangle, both in Bernstein form of degree (m, n), coefficient (i, j) at i (n +
+// 1) + j.
+struct Field {
+  int m = 0, n = 0;
+  std::vector<double> num, den;
+  double upper = 0;  // largest ratio of coefficients: bounds the field since den > 0
+};
+
+double binomial(int n, int k) {
+  double b = 1;
+  for (int i = 1; i <= k; ++i) b = b * (n - k + i) / i;
+  return b;
+}
+
+void update_upper(Field& f) {
+  f.upper = -std::numeric_limits<double>::infinity();
+  for (size_t i = 0; i < f.num.size(); ++i) f.upper = std::max(f.upper, f.num[i] / f.den[i]);
+}
+
+// Value at the corners, where coefficients are values.
+double corner_value(const Field& f) {
+  double best = -std::numeric_limits<double>::infinity();
+  for (int i : {0, f.m}) {
+    for (int j : {0, f.n}) {
+      const size_t k = static_cast<size_t>(i) * (f.n + 1) + j;
+      best = std::max(best, f.num[k] / f.den[k]);
+    }
+  }
+  return best;
+}
+
+// sign * |w x|^2 and w^2 as Bernstein products (NURBS Book, section 6.3: C(p,i) C(p,k) / C(2p,i+k)).
+Field squared_distance(const BezierPatch& patch, double sign) {
+  const int p = patch.degree_u, q = patch.degree_v;
+  Field f;
+  f.m = 2 * p;
+  f.n = 2 * q;
+  f.num.assign(static_cast<size_t>(f.m + 1) * (f.n + 1), 0);
+  f.den = f.num;
+  std::array<double, kMaxDegree + 1> cp, cq;
+  for (int i = 0; i <= p; ++i) cp[i] = binomial(p, i);
+  for (int j = 0; j <= q; ++j) cq[j] = binomial(q, j);
+  for (int i = 0; i <= p; ++i) {
+    for (int j = 0; j <= q; ++j) {
+      for (int k = 0; k <= p; ++k) {
+        for (int l = 0; l <= q; ++l) {
+          const Vec4 &a = patch.point(i, j), &b = patch.point(k, l);
+          const double c = cp[i] * cp[k] * cq[j] * cq[l];
+          const size_t at = static_cast<size_t>(i + k) * (f.n + 1) + (j + l);
+          f.num[at] += sign * c * a.head<3>().dot(b.head<3>());
+          f.den[at] += c * a[3] * b[3];
+        }
+      }
+    }
+  }
+  for (int i = 0; i <= f.m; ++i) {
+    for (int j = 0; j <= f.n; ++j) {
+      const double c = binomial(f.m, i) * binomial(f.n, j);
+      f.num[static_cast<size_t>(i) * (f.n + 1) + j] /= c;
+      f.den[static_cast<size_t>(i) * (f.n + 1) + j] /= c;
+    }
+  }
+  update_upper(f);
+  return f;
+}
+
+// Halves rows of `count` coefficients `stride` apart by de Casteljau at 1/2; `a` keeps the first half, `b`
+// gets the second.
+void halve_row(double* a, double* b, int degree, size_t stride) {
+  for (int i = 0; i <= degree; ++i) {
+    b[(degree - i) * stride] = a[degree * stride];
+    for (int k = degree; k > i; --k) a[k * stride] = 0.5 * (a[k * stride] + a[(k - 1) * stride]);
+  }
+}
+
+std::pair<Field, Field> halve(Field f, bool in_u) {
+  Field g = f;
+  const size_t width = f.n + 1;
+  for (auto* c : {&f.num, &f.den}) {
+    std::vector<double>& d = c == &f.num ? g.num : g.den;
+    if (in_u) {
+      for (size_t j = 0; j < width; ++j) halve_row(c->data() + j, d.data() + j, f.m, width);
+    } else {
+      for (int i = 0; i <= f.m; ++i) halve_row(c->data() + i * width, d.data() + i * width, f.n, 1);
+    }
+  }
+  update_upper(f);
+  update_upper(g);
+  return {std::move(f), std::move(g)};
+}
+
+// Whether the field bends more along u than along v (largest second difference of the numerator).
+bool bends_more_in_u(const Field& f) {
+  double du = 0, dv = 0;
+  const auto at = [&](int i, int j) {
+    const size_t k = static_cast<size_t>(i) * (f.n + 1) + j;
+    return f.num[k] / f.den[k];
+  };
+  for (int i = 0; i <= f.m; ++i) {
+    for (int j = 0; j <= f.n; ++j) {
+      if (i > 0 && i < f.m)
+        du = std::max(du, std::abs(at(i - 1, j) - 2 * at(i, j) + at(i + 1, j)) * f.m * f.m);
+      if (j > 0 && j < f.n)
+        dv = std::max(dv, std::abs(at(i, j - 1) - 2 * at(i, j) + at(i, j + 1)) * f.n * f.n);
+    }
+  }
+  return du >= dv;
+}
+
+// Upper bound of sign * |x|^2 over all patches.
+double bound_squared(const std::vector<BezierPatch>& patches, double sign) {
+  const auto lower = [](const Field& a, const Field& b) { return a.upper < b.upper; };
+  std::priority_queue<Field, std::vector<Field>, decltype(lower)> open(lower);
+  double reached = -std::numeric_limits<double>::infinity(), magnitude = 0;
+  for (const BezierPatch& patch : patches) {
+    Field f = squared_distance(patch, sign);
+    reached = std::max(reached, corner_value(f));
+    magnitude = std::max(magnitude, std::abs(f.upper));
+    open.push(std::move(f));
+  }
+  for (int split = 0; split < kMaxSplits; ++split) {
+    const Field& worst = open.top();
+    if (worst.upper - reached <= kRelativeWidth * std::abs(reached)) break;
+    const bool in_u = bends_more_in_u(worst);
+    auto [f, g] = halve(worst, in_u);
+    open.pop();
+    reached = std::max({reached, corner_value(f), corner_value(g)});
+    open.push(std::move(f));
+    open.push(std::move(g));
+  }
+  return open.top().upper + kRoundOff * magnitude;
+}
+
+}  // namespace
+
+RadiusBounds bound_radius(const std::vector<BezierPatch>& patches) {
+  RadiusBounds bounds;
+  bounds.outer = std::sqrt(std::max(0.0, bound_squared(patches, 1)));
+  bounds.inner = std::sqrt(std::max(0.0, -bound_squared(patches, -1)));
+  return bounds;
+}
+
+}  // namespace nurbs

@@ -1,0 +1,22 @@
+// Rigorous bounds of a body's distance from the origin, from control nets.
+#pragma once
+
+#include <vector>
+
+#include "nurbs/bezier_patch.h"
+
+namespace nurbs {
+
+struct RadiusBounds {
+  double inner = 0;  // no surface point is nearer to the origin
+  double outer = 0;  // none is farther
+};
+
+// Least and largest |x| over the patches, each rounded to the safe side: the Bernstein coefficients of |w
+// x|^2 and w^2 bound their ratio over a patch, and the patch with the worst bound is halved until the bound
+// and an actual surface point differ by less than 1e-6 (or a cap is reached: the bound is then safe but
+// looser). For a sphere the coefficients are constant and the bounds equal the radius to round-off. About 1
+// to 10 ms.
+RadiusBounds bound_radius(const std::vector<BezierPatch>& patches);
+
+}  // namespace nurbs

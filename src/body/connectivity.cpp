@@ -1,0 +1,356 @@
+// Edge matching: candidates by end points and middle, then curve against curve.
+#include "body/connectivity.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "body/local_form.h"
+
+namespace nurbs {
+namespace {
+
+constexpr int kEdgeSamples = 5;         // points at which two edge curves are first compared
+constexpr int kKinkSamples = 17;        // points at which the normals of two sides are compared
+constexpr int kProjectionSamples = 32;  // starts of the search for the closest point of a curve
+
+struct Edge {
+  int patch = 0, edge = 0;
+  std::array<Vec3, kEdgeSamples> at;  // points at t = 0, 1/4, .., 1
+  bool collapsed = false;
+};
+
+Vec3 edge_point(const BezierPatch& patch, int edge, double t) {
+  const Vec2 p = edge_parameters(edge, t);
+  return evaluate0(patch, p[0], p[1]);
+}
+
+bool is_collapsed(const BezierPatch& patch, int edge, double tolerance) {
+  const int n = edge < 2 ? patch.degree_v : patch.degree_u;
+  Vec3 first = Vec3::Zero();
+  for (int k = 0; k <= n; ++k) {
+    const int i = edge < 2 ? (edge == 0 ? 0 : patch.degree_u) : k;
+    const int j = edge < 2 ? k : (edge == 2 ? 0 : patch.degree_v);
+    const Vec4& h = patch.point(i, j);
+    const Vec3 x = h.head<3>() / h[3];
+    if (k == 0) first = x;
+    if ((x - first).norm() > tolerance) return false;
+  }
+  return true;
+}
+
+Edge make_edge(const BezierPatch& patch, int index, int edge, double tolerance) {
+  Edge e;
+  e.patch = index;
+  e.edge = edge;
+  for (int k = 0; k < kEdgeSamples; ++k) e.at[k] = edge_point(patch, edge, k / (kEdgeSamples - 1.0));
+  e.collapsed = is_collapsed(patch, edge, tolerance);
+  return e;
+}
+
+// Parameter of the point of an edge closest to x: the best of a row of samples, then golden-section search
+// between its neighbours.
+double closest_parameter(const BezierPatch& patch, int edge, const Vec3& x) {
+  int best = 0;
+  double least = std::numeric_limits<double>::infinity();
+  for (int k = 0; k <= kProjectionSamples; ++k) {
+    const double d = (edge_point(patch, edge, k / double(kProjectionSamples)) - x).squaredNorm();
+    if (d < least) least = d, best = k;
+  }
+  double lo = std::max(0, best - 1) / double(kProjectionSamples);
+  double hi = std::min(kProjectionSamples, best + 1) / double(kProjectionSamples);
+  constexpr double kGolden = 0.6180339887498949;
+  for (int i = 0; i < 45; ++i) {
+    const double a = hi - kGolden * (hi - lo), b = lo + kGolden * (hi - lo);
+    const bool left =
+        (edge_point(patch, edge, a) - x).squaredNorm() < (edge_point(patch, edge, b) - x).squaredNorm();
+    (left ? hi : lo) = left ? b : a;
+  }
+  return 0.5 * (lo + hi);
+}
+
+double same_parameter_gap(const Edge& a, const Edge& b, bool reversed) {
+  double gap = 0;
+  for (int k = 0; k < kEdgeSamples; ++k) {
+    gap = std::max(gap, (a.at[k] - b.at[reversed ? kEdgeSamples - 1 - k : k]).norm());
+  }
+  return gap;
+}
+
+// Largest distance of the samples of `a` from the curve `b`, whatever the parametrisation. Their ends must
+// agree, and the middle of b must lie on a too: otherwise b could be a longer curve between the same ends.
+double curve_gap(const std::vector<BezierPatch>& patches, const Edge& a, const Edge& b) {
+  double gap = 0;
+  for (const Vec3& x : a.at) {
+    const double t = closest_parameter(patches[b.patch], b.edge, x);
+    gap = std::max(gap, (edge_point(patches[b.patch], b.edge, t) - x).norm());
+  }
+  const Vec3& middle = b.at[kEdgeSamples / 2];
+  const double t = closest_parameter(patches[a.patch], a.edge, middle);
+  return std::max(gap, (edge_point(patches[a.patch], a.edge, t) - middle).norm());
+}
+
+struct Candidate {
+  int a = 0, b = 0;  // indices into the edges, a < b
+  bool reversed = false;
+  double gap = 0;
+};
+
+bool ends_agree(const Edge& a, const Edge& b, bool reversed, double tolerance) {
+  const Vec3& first = reversed ? b.at.back() : b.at.front();
+  const Vec3& last = reversed ? b.at.front() : b.at.back();
+  return (a.at.front() - first).norm() <= tolerance && (a.at.back() - last).norm() <= tolerance;
+}
+
+void add_candidates(const std::vector<BezierPatch>& patches, const std::vector<Edge>& edges, int a, int b,
+                    double tolerance, std::vector<Candidate>& out) {
+  for (bool reversed : {false, true}) {
+    if (!ends_agree(edges[a], edges[b], reversed, tolerance)) continue;
+    double gap = same_parameter_gap(edges[a], edges[b], reversed);
+    if (gap > tolerance) {
+      const bool closed = (edges[a].at.front() - edges[a].at.back()).norm() <= tolerance;
+      if (closed) continue;  // on a closed curve only equal parameters tell the direction
+      gap = curve_gap(patches, edges[a], edges[b]);
+    }
+    if (gap <= tolerance) out.push_back({std::min(a, b), std::max(a, b), reversed, gap});
+  }
+}
+
+// All pairs of edges that agree. Edges are swept in the order of the x coordinate of the middle of their
+// ends, which does not depend on direction.
+std::vector<Candidate> find_candidates(const std::vector<BezierPatch>& patches,
+                                       const std::vector<Edge>& edges, double tolerance) {
+  const auto key = [&](int e) { return 0.5 * (edges[e].at.front()[0] + edges[e].at.back()[0]); };
+  std::vector<int> order;
+  for (int e = 0; e < static_cast<int>(edges.size()); ++e) {
+    if (!edges[e].collapsed) order.push_back(e);
+  }
+  std::sort(order.begin(), order.end(),
+            [&](int a, int b) { return key(a) != key(b) ? key(a) < key(b) : a < b; });
+  std::vector<Candidate> out;
+  for (size_t i = 0; i < order.size(); ++i) {
+    for (size_t j = i + 1; j < order.size() && key(order[j]) - key(order[i]) <= tolerance; ++j) {
+      add_candidates(patches, edges, order[i], order[j], tolerance, out);
+    }
+  }
+  std::sort(out.begin(), out.end(), [](const Candidate& p, const Candidate& q) {
+    return p.gap != q.gap ? p.gap < q.gap : p.a != q.a ? p.a < q.a : p.b < q.b;
+  });
+  return out;
+}
+
+void join(const Edge& a, const Edge& b, bool reversed, PatchLinks& links) {
+  EdgeLink& la = links[a.patch][a.edge];
+  EdgeLink& lb = links[b.patch][b.edge];
+  la.patch = b.patch;
+  la.edge = b.edge;
+  lb.patch = a.patch;
+  lb.edge = a.edge;
+  la.reversed = lb.reversed = reversed;
+}
+
+UnmatchedEdge describe_unmatched(const std::vector<Edge>& edges, const PatchLinks& links, int left) {
+  UnmatchedEdge out;
+  out.patch = edges[left].patch;
+  out.edge = edges[left].edge;
+  out.gap = std::numeric_limits<double>::infinity();
+  for (int e = 0; e < static_cast<int>(edges.size()); ++e) {
+    const bool free = links[edges[e].patch][edges[e].edge].patch < 0 && !edges[e].collapsed;
+    if (e == left || !free) continue;
+    for (bool reversed : {false, true}) {
+      const double gap = same_parameter_gap(edges[left], edges[e], reversed);
+      if (gap >= out.gap) continue;
+      out.gap = gap;
+      out.nearest_patch = edges[e].patch;
+      out.nearest_edge = edges[e].edge;
+    }
+  }
+  return out;
+}
+
+// Signed angle from the normal of `a` to that of `b` at a common point; positive where b's surface bends
+// away. `along` is the direction in which the edge runs with a's surface on its left, seen from outside.
+double signed_angle(const Vec3& normal_a, const Vec3& normal_b, const Vec3& along) {
+  const double angle = angle_between(normal_a, normal_b);
+  return along.cross(normal_a).dot(normal_b) >= 0 ? angle : -angle;
+}
+
+// Closest point of an edge by Gauss-Newton from `t`, a parameter near it: a few steps, since the curves
+// coincide.
+double refine_closest(const BezierPatch& patch, int edge, const Vec3& x, double t) {
+  for (int i = 0; i < 8; ++i) {
+    const Vec2 p = edge_parameters(edge, t);
+    const Jet1 j = evaluate1(patch, p[0], p[1]);
+    const Vec3& along = edge < 2 ? j.sv : j.su;
+    const double before = t;
+    t = std::clamp(t + (x - j.s).dot(along) / along.squaredNorm(), 0.0, 1.0);
+    if (std::abs(t - before) < 1e-12) break;
+  }
+  return t;
+}
+
+// Adds the groove between two sides that meet at a concave angle, see measure_kinks.
+void add_groove(double angle, const LocalForm& a, const LocalForm& b, int p, int e, const Vec3& outward,
+                KinkSummary& worst) {
+  const double width = (e < 2 ? a.su : a.sv).norm();
+  const double ka = normal_curvature(a, outward), kb = normal_curvature(b, outward),
+               flatter = std::min(ka, kb);
+  double depth = 0.25 * angle * width, excess = angle * width;  // of straight sides
+  if (flatter > 0) {
+    const double roots = std::sqrt(ka) + std::sqrt(kb);
+    depth = std::min(depth, angle * angle / (2 * roots * roots));
+    excess = std::min(excess, angle * angle / (2 * flatter));
+  }
+  worst.concave = std::max(worst.concave, angle);
+  worst.excess = std::max(worst.excess, excess);
+  if (depth <= worst.depth) return;
+  worst.depth = depth;
+  worst.deepest = {p, a.u, a.v};
+}
+
+double edge_kink(const std::vector<BezierPatch>& patches, int p, int e, const EdgeLink& link,
+                 KinkSummary& worst) {
+  double kink = 0;
+  const bool forward = e == 1 || e == 2;  // the free parameter runs with the patch on its left
+  for (int k = 0; k < kKinkSamples; ++k) {
+    const double t = k / (kKinkSamples - 1.0);
+    const Vec2 at = edge_parameters(e, t);
+    const LocalForm a = local_form(patches[p], at[0], at[1]);
+    // An end of the edge may be a pole, where the kink has no meaning; the next sample sees it.
+    const bool end = k == 0 || k == kKinkSamples - 1;
+    if (end && (a.u != at[0] || a.v != at[1])) continue;
+    const double s = refine_closest(patches[link.patch], link.edge, a.point, partner_parameter(link, t));
+    const Vec2 there = edge_parameters(link.edge, s);
+    const LocalForm b = local_form(patches[link.patch], there[0], there[1]);
+    if (end && (b.u != there[0] || b.v != there[1])) continue;
+    const Vec3 along = (forward ? 1.0 : -1.0) * (e < 2 ? a.sv : a.su);
+    const double angle = signed_angle(a.normal, b.normal, along);
+    if (angle < 0) add_groove(-angle, a, b, p, e, along.cross(a.normal), worst);
+    worst.convex = std::max(worst.convex, angle);
+    if (std::abs(angle) > std::abs(kink)) kink = angle;
+  }
+  return kink;
+}
+
+double spread_of_normals(const BezierPatch& patch, int edge, double inset) {
+  std::array<Vec3, kKinkSamples> normal;
+  for (int k = 0; k < kKinkSamples; ++k) {
+    Vec2 at = edge_parameters(edge, k / (kKinkSamples - 1.0));
+    at[edge < 2 ? 0 : 1] += edge % 2 ? -inset : inset;
+    const Jet1 j = evaluate1(patch, at[0], at[1]);
+    normal[k] = j.su.cross(j.sv).normalized();
+  }
+  double spread = 0;
+  for (const Vec3& a : normal) {
+    for (const Vec3& b : normal) spread = std::max(spread, angle_between(a, b));
+  }
+  return spread;
+}
+
+// Spread of the normals in the limit at the pole: what is left after extrapolating the part proportional to
+// the distance from it, which any smooth pole has.
+double pole_kink(const BezierPatch& patch, int edge) {
+  const double far = spread_of_normals(patch, edge, 2e-4), near = spread_of_normals(patch, edge, 1e-4);
+  return std::max(0.0, 2 * near - far);
+}
+
+// Direction, +1 or -1, in which the free parameter of an edge runs round the patch, counter-clockwise being
+// +1.
+int boundary_sense(int edge) {
+  return edge == 1 || edge == 2 ? 1 : -1;
+}
+
+}  // namespace
+
+Vec2 edge_parameters(int edge, double t) {
+  switch (edge) {
+    case 0:
+      return {0, t};
+    case 1:
+      return {1, t};
+    case 2:
+      return {t, 0};
+    default:
+      return {t, 1};
+  }
+}
+
+UnmatchedEdge connect_patches(const std::vector<BezierPatch>& patches, double tolerance, PatchLinks& links) {
+  links.assign(patches.size(), {});
+  std::vector<Edge> edges;
+  for (size_t p = 0; p < patches.size(); ++p) {
+    for (int e = 0; e < 4; ++e) {
+      edges.push_back(make_edge(patches[p], static_cast<int>(p), e, tolerance));
+      links[p][e].collapsed = edges.back().collapsed;
+    }
+  }
+  for (const Candidate& c : find_candidates(patches, edges, tolerance)) {
+    const Edge &a = edges[c.a], &b = edges[c.b];
+    if (links[a.patch][a.edge].patch < 0 && links[b.patch][b.edge].patch < 0) join(a, b, c.reversed, links);
+  }
+  for (size_t i = 0; i < edges.size(); ++i) {
+    const EdgeLink& link = links[edges[i].patch][edges[i].edge];
+    if (link.patch < 0 && !link.collapsed) return describe_unmatched(edges, links, static_cast<int>(i));
+  }
+  return {};
+}
+
+KinkSummary measure_kinks(const std::vector<BezierPatch>& patches, PatchLinks& links) {
+  KinkSummary worst;
+  for (size_t p = 0; p < links.size(); ++p) {
+    for (int e = 0; e < 4; ++e) {
+      EdgeLink& link = links[p][e];
+      if (link.collapsed) {
+        link.kink = pole_kink(patches[p], e);
+        worst.convex = std::max(worst.convex, link.kink);
+      } else {
+        link.kink = edge_kink(patches, static_cast<int>(p), e, link, worst);
+      }
+    }
+  }
+  return worst;
+}
+
+bool orient_surfaces(const PatchLinks& links, const std::vector<int>& surface_of_patch, int surfaces,
+                     std::vector<bool>& turned, std::vector<int>& parts) {
+  struct Relation {
+    int other;
+    bool opposite;
+  };
+  std::vector<std::vector<Relation>> relations(surfaces);
+  for (size_t p = 0; p < links.size(); ++p) {
+    for (int e = 0; e < 4; ++e) {
+      const EdgeLink& link = links[p][e];
+      if (link.patch < 0) continue;
+      // Two patches agree when each runs the common edge against the other.
+      const int sense = boundary_sense(e) * boundary_sense(link.edge) * (link.reversed ? -1 : 1);
+      relations[surface_of_patch[p]].push_back({surface_of_patch[link.patch], sense > 0});
+    }
+  }
+  turned.assign(surfaces, false);
+  parts.assign(surfaces, -1);
+  int part = 0;
+  for (int seed = 0; seed < surfaces; ++seed) {
+    if (parts[seed] >= 0) continue;
+    std::vector<int> open = {seed};
+    parts[seed] = part;
+    while (!open.empty()) {
+      const int s = open.back();
+      open.pop_back();
+      for (const Relation& r : relations[s]) {
+        const bool wanted = turned[s] != r.opposite;
+        if (parts[r.other] < 0) {
+          parts[r.other] = part;
+          turned[r.other] = wanted;
+          open.push_back(r.other);
+        } else if (turned[r.other] != wanted) {
+          return false;
+        }
+      }
+    }
+    ++part;
+  }
+  return true;
+}
+
+}  // namespace nurbs

@@ -1,0 +1,54 @@
+// Which patch edges lie on each other, found from the geometry alone, and how the normals meet there.
+#pragma once
+
+#include <array>
+#include <string>
+#include <vector>
+
+#include "body/shape.h"
+
+namespace nurbs {
+
+using PatchLinks = std::vector<std::array<EdgeLink, 4>>;
+
+// Parameters of the point at `t` in [0,1] of an edge (numbered as in EdgeLink).
+Vec2 edge_parameters(int edge, double t);
+
+// The other end of a link: the parameter `t` of an edge as counted on its partner.
+inline double partner_parameter(const EdgeLink& link, double t) {
+  return link.reversed ? 1 - t : t;
+}
+
+struct UnmatchedEdge {
+  int patch = -1, edge = -1;                  // an edge that nothing lies on; -1 when every edge is matched
+  int nearest_patch = -1, nearest_edge = -1;  // the free edge that comes closest ...
+  double gap = 0;                             // ... and the largest distance between the two
+};
+
+// Pairs the edges of `patches` whose curves agree within `tolerance` (length), closest pairs first; an edge
+// whose control points all lie within the tolerance is collapsed. Curves are compared as curves, so the two
+// sides may be parametrised differently; the whole of one edge must lie on the whole of the other (no
+// T-junctions). O(n log n) for n patches. Returns the first edge left over, if any.
+UnmatchedEdge connect_patches(const std::vector<BezierPatch>& patches, double tolerance, PatchLinks& links);
+
+// The worst of a body's joints.
+struct KinkSummary {
+  double convex = 0, concave = 0;  // largest angles between normals that open and that close, rad, both >= 0
+  double depth = 0;                // of the deepest groove that the convex hull bridges at a concave kink
+  SurfacePoint deepest;            // where that is
+  double excess = 0;               // how far one side of such a groove rises above the other's tangent plane
+};
+
+// Fills EdgeLink::kink from the normals on both sides, which must be consistently oriented. On a collapsed
+// edge the kink is how far the normals around the pole spread from each other. A groove's depth is that below
+// the common tangent of the two sides, taken as arcs of their curvatures k across the edge: kink^2 / (2
+// (sqrt(k_a) + sqrt(k_b))^2), never more than that of two straight sides a patch wide.
+KinkSummary measure_kinks(const std::vector<BezierPatch>& patches, PatchLinks& links);
+
+// For each surface, whether it must be turned (u and v exchanged) to agree with the first surface of its
+// connected part. `parts` receives the part each surface belongs to. Returns false if the patches close on a
+// one-sided surface.
+bool orient_surfaces(const PatchLinks& links, const std::vector<int>& surface_of_patch, int surfaces,
+                     std::vector<bool>& turned, std::vector<int>& parts);
+
+}  // namespace nurbs

@@ -1,0 +1,272 @@
+// Dents: coarse search among samples, then exact supports at the worst of them.
+#include "body/convexity.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <functional>
+#include <limits>
+
+#include "body/local_form.h"
+#include "body/support.h"
+
+namespace nurbs {
+namespace {
+
+constexpr int kPairsIfConvex = 1200, kPairsIfDented = 4000;  // samples compared with each other
+constexpr int kStarts = 1000;      // samples from which the best start of a support is taken
+constexpr double kNoDent = 1e-13;  // of the size: round-off of a support
+constexpr int kTiltSteps = 24;     // golden sections per direction in the search for the nearest hull plane
+constexpr int kMostCuts = 30;      // supports spent on one depth
+constexpr double kDepthTolerance = 1e-3;
+constexpr double kWidestTilt = 2;  // tangent of the largest tilt of that plane against the surface
+constexpr int kPlaceRounds = 5;    // halvings of the sample step in the search for the deepest point
+
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+
+// Every k-th sample so that at most `most` remain.
+std::vector<int> thin_out(size_t count, int most) {
+  std::vector<int> chosen;
+  const size_t stride = std::max<size_t>((count + most - 1) / most, 1);
+  for (size_t i = 0; i < count; i += stride) chosen.push_back(static_cast<int>(i));
+  return chosen;
+}
+
+// Vectors as one array per coordinate, so that the loops over them vectorise.
+struct Columns {
+  std::vector<double> x, y, z;
+  void add(const Vec3& a) {
+    x.push_back(a[0]);
+    y.push_back(a[1]);
+    z.push_back(a[2]);
+  }
+  size_t size() const { return x.size(); }
+  Vec3 at(size_t i) const { return {x[i], y[i], z[i]}; }
+};
+
+// Some of the samples.
+struct Clouds {
+  Columns points, normals;
+  std::vector<SurfacePoint> places;
+};
+
+Clouds choose(const std::vector<SurfaceSample>& samples, int most) {
+  Clouds clouds;
+  for (int i : thin_out(samples.size(), most)) {
+    clouds.points.add(samples[i].point);
+    clouds.normals.add(samples[i].normal);
+    clouds.places.push_back(samples[i].where);
+  }
+  return clouds;
+}
+
+// Largest projection of the points onto each normal.
+std::vector<double> sampled_support(const Clouds& c) {
+  std::vector<double> support(c.points.size(), -kInfinity);
+  for (size_t i = 0; i < c.points.size(); ++i) {
+    const double px = c.points.x[i], py = c.points.y[i], pz = c.points.z[i];
+    for (size_t j = 0; j < support.size(); ++j) {
+      const double p = c.normals.x[j] * px + c.normals.y[j] * py + c.normals.z[j] * pz;
+      support[j] = p > support[j] ? p : support[j];
+    }
+  }
+  return support;
+}
+
+// Depth of each point below the supporting planes of the normals.
+std::vector<double> sampled_depth(const Clouds& c, const std::vector<double>& support) {
+  std::vector<double> depth(c.points.size(), kInfinity);
+  for (size_t j = 0; j < support.size(); ++j) {
+    const double nx = c.normals.x[j], ny = c.normals.y[j], nz = c.normals.z[j], h = support[j];
+    for (size_t i = 0; i < depth.size(); ++i) {
+      const double below = h - (c.points.x[i] * nx + c.points.y[i] * ny + c.points.z[i] * nz);
+      depth[i] = below < depth[i] ? below : depth[i];
+    }
+  }
+  return depth;
+}
+
+size_t index_of_largest(const std::vector<double>& v) {
+  return static_cast<size_t>(std::max_element(v.begin(), v.end()) - v.begin());
+}
+
+struct Minimum {
+  double at = 0, value = 0;
+};
+
+// Minimum of a convex function on [-range, range] by golden sections.
+template <class Function>
+Minimum minimise(const Function& f, double range) {
+  constexpr double kGolden = 0.6180339887498949;
+  double lo = -range, hi = range;
+  double a = hi - kGolden * (hi - lo), b = lo + kGolden * (hi - lo), fa = f(a), fb = f(b);
+  for (int i = 0; i < kTiltSteps; ++i) {
+    if (fa < fb) {
+      hi = b, b = a, fb = fa;
+      a = hi - kGolden * (hi - lo), fa = f(a);
+    } else {
+      lo = a, a = b, fa = fb;
+      b = lo + kGolden * (hi - lo), fb = f(b);
+    }
+  }
+  return fa < fb ? Minimum{a, fa} : Minimum{b, fb};
+}
+
+// Planes through surface points, in the axes (t1, t2, n) of a dent: the rise of the k-th above the dent's
+// point along the direction (a, b, 1) is (a, b, 1) . plane.
+using Planes = std::vector<Vec3>;
+
+double highest(const Planes& planes, double a, double b) {
+  double most = -kInfinity;
+  for (const Vec3& p : planes) most = std::max(most, a * p[0] + b * p[1] + p[2]);
+  return most;
+}
+
+// The tilt (a, b) at which the planes rise least, and that rise.
+Vec3 least_rise(const Planes& planes, double tilt) {
+  const auto inner = [&](double a) {
+    return minimise([&](double b) { return highest(planes, a, b); }, tilt);
+  };
+  const Minimum best = minimise([&](double a) { return inner(a).value; }, tilt);
+  return {best.at, inner(best.at).at, best.value};
+}
+
+// Measures dents at single points of a shape.
+class Probe {
+ public:
+  Probe(const Shape& shape, const Clouds& clouds, double spacing)
+      : shape_(shape), clouds_(clouds), spacing_(spacing) {}
+
+  // h(n) - n . x at a point.
+  double excess(const SurfacePoint& at) const {
+    const LocalForm f = form(at);
+    double most = 0;
+    for (const Vec3& y : supports(f.normal, at)) most = std::max(most, f.normal.dot(y - f.point));
+    return most;
+  }
+
+  // Distance along the normal from a point to the hull's boundary: by duality the least of h(d) - d . x over
+  // the directions d = n + a t1 + b t2, a convex function of (a, b), found by cutting planes (Kelley 1960).
+  double depth(const SurfacePoint& at) const {
+    const LocalForm f = form(at);
+    double upper = excess(at);
+    // In a shallow dent the hull's plane is tilted by at most about sqrt(2 excess / radius).
+    const double tilt = std::min(kWidestTilt, 4 * std::sqrt(2 * upper / shape_.bounding_radius));
+    Mat3 axes;
+    axes.col(0) = f.normal.unitOrthogonal();
+    axes.col(1) = f.normal.cross(axes.col(0));
+    axes.col(2) = f.normal;
+    Planes planes = {Vec3::Zero()};  // x itself
+    Vec3 best = Vec3::Zero();
+    for (int cut = 0; cut < kMostCuts && upper > kNoDent * shape_.bounding_radius; ++cut) {
+      const Vec3 d(best[0], best[1], 1);
+      const size_t before = planes.size();
+      for (const Vec3& y : supports((axes * d).normalized(), at)) {
+        planes.push_back(axes.transpose() * (y - f.point));
+      }
+      double rise = 0;
+      for (size_t k = before; k < planes.size(); ++k) rise = std::max(rise, planes[k].dot(d));
+      upper = std::min(upper, rise);
+      best = least_rise(planes, tilt);
+      if (upper - best[2] <= kDepthTolerance * upper) break;
+    }
+    return upper > kNoDent * shape_.bounding_radius ? upper : 0;
+  }
+
+ private:
+  LocalForm form(const SurfacePoint& at) const { return local_form(shape_.patches[at.patch], at.u, at.v); }
+
+  // Local support points along unit d: from the best sample and from around `near`, where a shallow dent's
+  // rims are.
+  std::array<Vec3, 5> supports(const Vec3& d, const SurfacePoint& near) const {
+    size_t best = 0;
+    double most = -kInfinity;
+    for (size_t i = 0; i < clouds_.points.size(); ++i) {
+      const double p = d[0] * clouds_.points.x[i] + d[1] * clouds_.points.y[i] + d[2] * clouds_.points.z[i];
+      if (p > most) most = p, best = i;
+    }
+    std::array<Vec3, 5> points;
+    points[4] = find_support(shape_, d, &clouds_.places[best]).point;
+    for (int side = 0; side < 4; ++side) {
+      const double step = side % 2 ? spacing_ : -spacing_;
+      const SurfacePoint start = walk(shape_, near, side < 2 ? step : 0, side < 2 ? 0 : step);
+      points[side] = find_support(shape_, d, &start).point;
+    }
+    return points;
+  }
+
+  const Shape& shape_;
+  const Clouds& clouds_;
+  double spacing_;
+};
+
+using Measure = std::function<double(const SurfacePoint&)>;
+
+// Largest value of `measure` near `at` within its patch, by compass search; moves `at` there.
+double climb(const Measure& measure, SurfacePoint& at, double step) {
+  double best = measure(at);
+  for (int round = 0; round < kPlaceRounds; ++round, step *= 0.5) {
+    const SurfacePoint from = at;
+    for (int side = 0; side < 4; ++side) {
+      SurfacePoint next = from;
+      double& moved = side < 2 ? next.u : next.v;
+      moved = std::clamp(moved + (side % 2 ? step : -step), 0.0, 1.0);
+      const double value = measure(next);
+      if (value > best) best = value, at = next;
+    }
+  }
+  return best;
+}
+
+// The worst of `places` by `measure`, refined.
+double worst_of(const Measure& measure, const std::vector<SurfacePoint>& places, double step,
+                SurfacePoint& where) {
+  double best = -kInfinity;
+  for (const SurfacePoint& place : places) {
+    const double value = measure(place);
+    if (value > best) best = value, where = place;
+  }
+  return climb(measure, where, step);
+}
+
+const SurfaceSample& most_concave(const std::vector<SurfaceSample>& samples) {
+  const auto bend = [](const SurfaceSample& s) { return s.k_min * s.spacing * s.spacing; };
+  return *std::min_element(samples.begin(), samples.end(),
+                           [&](const SurfaceSample& a, const SurfaceSample& b) { return bend(a) < bend(b); });
+}
+
+}  // namespace
+
+Dent find_dent(const Shape& shape, const std::vector<SurfaceSample>& samples, const KinkSummary& kinks) {
+  const double size = shape.bounding_radius;
+  const SurfaceSample& concave = most_concave(samples);
+  const bool suspect = kinks.concave > kKinkNoise || concave.k_min < -kCurvatureNoise / size;
+  const Clouds clouds = choose(samples, suspect ? kPairsIfDented : kPairsIfConvex);
+  const std::vector<double> support = sampled_support(clouds), depth = sampled_depth(clouds, support);
+  std::vector<double> excess = support;
+  for (size_t j = 0; j < excess.size(); ++j) excess[j] -= clouds.normals.at(j).dot(clouds.points.at(j));
+  const size_t deepest = index_of_largest(depth), highest = index_of_largest(excess);
+
+  Dent dent;
+  dent.depth = kinks.depth;
+  dent.where = kinks.deepest;
+  dent.excess = kinks.excess;
+  if (!suspect && excess[highest] <= kNoDent * size) return dent;
+
+  const double step = 1 / (std::sqrt(static_cast<double>(samples.size() / shape.patches.size())) - 1);
+  const Clouds starts = choose(samples, kStarts);
+  const Probe probe(shape, starts, step);
+  SurfacePoint where;
+  const std::vector<SurfacePoint> places = {clouds.places[highest], clouds.places[deepest], concave.where,
+                                            kinks.deepest};
+  dent.excess =
+      std::max(dent.excess, worst_of([&](const auto& at) { return probe.excess(at); }, places, step, where));
+  const double found = worst_of([&](const auto& at) { return probe.depth(at); }, places, step, where);
+  if (found > dent.depth) {
+    dent.depth = found;
+    dent.where = where;
+  }
+  return dent;
+}
+
+}  // namespace nurbs

@@ -1,0 +1,28 @@
+// How far a body is from convex: the depth of its dents.
+#pragma once
+
+#include <vector>
+
+#include "body/connectivity.h"
+#include "body/curvature.h"
+#include "body/shape.h"
+
+namespace nurbs {
+
+struct Dent {
+  double depth =
+      0;  // largest distance, along the surface normal, from the surface to the convex hull's boundary
+  SurfacePoint where;  // of the deepest point found
+  double excess =
+      0;  // largest h(n) - n . x over surface points x with normal n: what a local maximum of d . x
+          // may lack of the support function h(d); up to about 4 times the depth in a shallow dent
+};
+
+// Deepest dent of a shape whose patches, links and bounding radius are done. A closed surface with no
+// negative curvature and no concave kink is convex (van Heijenoort 1952); where `samples` or `kinks` show
+// either, the worst places are measured with the support mapping and refined: depth and excess are then right
+// to a few per cent for dents wider than the sample spacing. The samples are also compared with each other's
+// tangent planes, so a body that passes through itself is seen. About 2 ms, up to 100 ms with dents.
+Dent find_dent(const Shape& shape, const std::vector<SurfaceSample>& samples, const KinkSummary& kinks);
+
+}  // namespace nurbs

@@ -1,0 +1,129 @@
+// Nodes of the cube map (cube_map.h): a and b uniform in [-1, 1] on every face.
+#include "body/direction_atlas.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "body/cube_map.h"
+#include "body/shape.h"
+#include "body/support.h"
+#include "nurbs/tolerances.h"
+
+namespace nurbs {
+Vec3 DirectionAtlas::direction(int node) const {
+  const int n = cells + 1;
+  const int face = node / (n * n), i = node / n % n, j = node % n;
+  const int k = face / 2;
+  Vec3 d;
+  d[k] = face % 2 ? -1.0 : 1.0;
+  d[(k + 1) % 3] = -1.0 + 2.0 * i / cells;
+  d[(k + 2) % 3] = -1.0 + 2.0 * j / cells;
+  return d;
+}
+
+int DirectionAtlas::nearest(const Vec3& d) const {
+  const CubePoint c = to_cube(d);
+  if (!(c.major > 0)) return 0;
+  const double half = 0.5 * cells;
+  const int i = std::clamp(static_cast<int>((c.a + 1) * half + 0.5), 0, cells);
+  const int j = std::clamp(static_cast<int>((c.b + 1) * half + 0.5), 0, cells);
+  return (c.face * (cells + 1) + i) * (cells + 1) + j;
+}
+
+void DirectionAtlas::cell(const Vec3& d, int (&nodes)[4]) const {
+  const CubePoint c = to_cube(d);
+  const int i = cube_cell(c.a, cells), j = cube_cell(c.b, cells);
+  const int first = (c.face * (cells + 1) + i) * (cells + 1) + j;
+  nodes[0] = first;
+  nodes[1] = first + 1;
+  nodes[2] = first + cells + 1;
+  nodes[3] = first + cells + 2;
+}
+
+double DirectionAtlas::support_upper(const Vec3& d) const {
+  const CubePoint c = to_cube(d);
+  if (!(c.major > 0)) return 0;
+  const double half = 0.5 * cells;
+  const double a = (c.a + 1) * half, b = (c.b + 1) * half;
+  const int i = std::clamp(static_cast<int>(a), 0, cells - 1),
+            j = std::clamp(static_cast<int>(b), 0, cells - 1);
+  const double s = a - i, t = b - j;
+  const double* h = support.data() + (c.face * (cells + 1) + i) * (cells + 1) + j;
+  const double low = h[0] + t * (h[1] - h[0]);
+  const double* k = h + cells + 1;
+  const double high = k[0] + t * (k[1] - k[0]);
+  return c.major * (low + s * (high - low));
+}
+
+namespace {
+
+// A few points of every patch, to start the first support searches from.
+struct Sample {
+  SurfacePoint where;
+  Vec3 point;
+};
+
+std::vector<Sample> sample_patches(const Shape& shape) {
+  std::vector<Sample> samples;
+  samples.reserve(shape.patches.size() * kAtlasSamples * kAtlasSamples);
+  for (size_t p = 0; p < shape.patches.size(); ++p)
+    for (int i = 0; i < kAtlasSamples; ++i)
+      for (int j = 0; j < kAtlasSamples; ++j) {
+        const SurfacePoint at{static_cast<int>(p), (i + 0.5) / kAtlasSamples, (j + 0.5) / kAtlasSamples};
+        samples.push_back({at, evaluate0(shape.patches[p], at.u, at.v)});
+      }
+  return samples;
+}
+
+// The best sample along d, and the best of another patch (a second local maximum can only hide across a
+// joint).
+void best_samples(const std::vector<Sample>& samples, const Vec3& d, const Sample** first,
+                  const Sample** second) {
+  double best = -1e300, next = -1e300;
+  *first = *second = nullptr;
+  for (const Sample& s : samples) {
+    const double h = d.dot(s.point);
+    if (h > best) {
+      best = h;
+      *first = &s;
+    }
+  }
+  for (const Sample& s : samples) {
+    const double h = d.dot(s.point);
+    if (s.where.patch != (*first)->where.patch && h > next) {
+      next = h;
+      *second = &s;
+    }
+  }
+}
+
+}  // namespace
+
+void build_atlas(Shape& shape, int cells) {
+  DirectionAtlas& atlas = shape.atlas;
+  const std::vector<Sample> samples = sample_patches(shape);
+  const size_t count = 6u * static_cast<size_t>((cells + 1) * (cells + 1));
+  atlas.cells = cells;
+  atlas.support.assign(count, 0);
+  atlas.point.assign(count, Vec3::Zero());
+  atlas.where.assign(count, SurfacePoint());
+  for (size_t node = 0; node < count; ++node) {
+    const Vec3 cube = atlas.direction(static_cast<int>(node));
+    const double length = cube.norm();
+    const Vec3 d = cube / length;
+    const Sample *first, *second;
+    best_samples(samples, d, &first, &second);
+    Support support = find_support(shape, d, &first->where);
+    if (second) {
+      const Support other = find_support(shape, d, &second->where);
+      const double upper = std::max(support.upper, other.upper);
+      if (other.h > support.h) support = other;
+      if (!(support.converged && other.converged)) support.upper = upper;
+    }
+    atlas.support[node] = support.upper * length;
+    atlas.point[node] = support.point;
+    atlas.where[node] = support.where;
+  }
+}
+
+}  // namespace nurbs

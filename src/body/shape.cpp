@@ -1,0 +1,253 @@
+// From the surfaces of a file to a body: split, joined, turned outward, weighed, centred, checked.
+#include "body/shape.h"
+
+#include <algorithm>
+#include <cmath>
+#include <sstream>
+
+#include "body/bounds.h"
+#include "body/connectivity.h"
+#include "body/convexity.h"
+#include "body/curvature_rate.h"
+#include "body/mass_properties.h"
+#include "nurbs/tolerances.h"
+
+namespace nurbs {
+namespace {
+
+// A shape under construction, with what its messages need.
+struct Draft {
+  Shape shape;
+  std::vector<BezierPiece>
+      pieces;                // knot rectangle of each Bezier patch; their patches are moved to the shape
+  std::vector<bool> turned;  // surfaces whose u and v were exchanged
+  std::vector<std::string> warnings;
+};
+
+std::string number(double x) {
+  std::ostringstream out;
+  out.precision(6);
+  out << x;
+  return out.str();
+}
+
+void check_surfaces(const std::vector<NurbsSurface>& surfaces) {
+  if (surfaces.empty()) throw ShapeError("no surfaces");
+  for (size_t i = 0; i < surfaces.size(); ++i) {
+    const std::string defect = find_defect(surfaces[i]);
+    if (!defect.empty()) throw ShapeError("patch " + std::to_string(i) + ": " + defect);
+  }
+}
+
+double diagonal(const std::vector<BezierPatch>& patches) {
+  Eigen::AlignedBox3d box;
+  for (const BezierPatch& patch : patches) {
+    for (const Vec4& p : patch.points) box.extend(Vec3(p.head<3>() / p[3]));
+  }
+  return box.diagonal().norm();
+}
+
+void split(Draft& draft) {
+  Shape& s = draft.shape;
+  s.patches.clear();
+  s.surface_of_patch.clear();
+  draft.pieces.clear();
+  for (size_t i = 0; i < s.surfaces.size(); ++i) {
+    for (BezierPiece& piece : split_to_bezier(s.surfaces[i])) {
+      s.patches.push_back(std::move(piece.patch));
+      s.surface_of_patch.push_back(static_cast<int>(i));
+      draft.pieces.push_back(std::move(piece));
+    }
+  }
+}
+
+// "patch 3 edge u=1" of a Bezier patch's edge.
+std::string edge_name(const Draft& draft, int patch, int edge) {
+  const BezierPiece& piece = draft.pieces[patch];
+  const double at[4] = {piece.u0, piece.u1, piece.v0, piece.v1};
+  const int surface = draft.shape.surface_of_patch[patch];
+  const NurbsSurface& s = draft.shape.surfaces[surface];
+  std::string name =
+      "patch " + std::to_string(surface) + " edge " + (edge < 2 ? "u=" : "v=") + number(at[edge]);
+  const bool whole = edge < 2 ? piece.v0 == s.knots_v[s.degree_v] && piece.v1 == s.knots_v[s.size_v]
+                              : piece.u0 == s.knots_u[s.degree_u] && piece.u1 == s.knots_u[s.size_u];
+  if (whole) return name;
+  const double from = edge < 2 ? piece.v0 : piece.u0, to = edge < 2 ? piece.v1 : piece.u1;
+  return name + " (" + (edge < 2 ? "v=" : "u=") + number(from) + ".." + number(to) + ")";
+}
+
+void connect(Draft& draft) {
+  Shape& s = draft.shape;
+  const double size = diagonal(s.patches);
+  if (!(size > 0)) throw ShapeError("all control points coincide");
+  const UnmatchedEdge left = connect_patches(s.patches, kJoinTolerance * size, s.links);
+  if (left.patch < 0) return;
+  std::string message = edge_name(draft, left.patch, left.edge) + " has no partner: the surface is open";
+  if (left.nearest_patch >= 0) {
+    message += ", the nearest free edge is " + edge_name(draft, left.nearest_patch, left.nearest_edge) +
+               ", " + number(left.gap) + " away (allowed " + number(kJoinTolerance * size) + ")";
+  }
+  throw ShapeError(message);
+}
+
+// One closed body: consistent sides everywhere, and connected.
+std::vector<bool> sides_to_turn(const Draft& draft) {
+  const int count = static_cast<int>(draft.shape.surfaces.size());
+  std::vector<bool> turned;
+  std::vector<int> parts;
+  if (!orient_surfaces(draft.shape.links, draft.shape.surface_of_patch, count, turned, parts)) {
+    throw ShapeError("the patches close on a one-sided surface, which has no inside");
+  }
+  for (int i = 0; i < count; ++i) {
+    if (parts[i] == 0) continue;
+    throw ShapeError("patch " + std::to_string(i) +
+                     " is not connected to patch 0: the surfaces bound more than one body");
+  }
+  return turned;
+}
+
+// Turns the surfaces marked, and does again what depends on it.
+void turn_surfaces(Draft& draft, const std::vector<bool>& turn) {
+  if (std::none_of(turn.begin(), turn.end(), [](bool t) { return t; })) return;
+  for (size_t i = 0; i < turn.size(); ++i) {
+    if (!turn[i]) continue;
+    draft.shape.surfaces[i] = swap_uv(draft.shape.surfaces[i]);
+    draft.turned[i] = !draft.turned[i];
+  }
+  split(draft);
+  connect(draft);
+}
+
+void warn_of_turned(Draft& draft) {
+  std::string list;
+  size_t count = 0;
+  for (size_t i = 0; i < draft.turned.size(); ++i) {
+    if (!draft.turned[i]) continue;
+    list += (count++ ? ", " : "") + std::to_string(i);
+  }
+  if (count == 0) return;
+  if (count == draft.turned.size()) {
+    draft.warnings.push_back("the body was inside out: every patch has been turned to face outward");
+  } else {
+    draft.warnings.push_back((count == 1 ? "patch " : "patches ") + list + " faced inward and " +
+                             (count == 1 ? "has" : "have") + " been turned outward");
+  }
+}
+
+// Faces every surface outward and weighs the body.
+void orient_and_weigh(Draft& draft) {
+  Shape& s = draft.shape;
+  draft.turned.assign(s.surfaces.size(), false);
+  turn_surfaces(draft, sides_to_turn(draft));
+  s.mass = integrate_mass(s.patches);
+  if (s.mass.volume < 0) {
+    turn_surfaces(draft, std::vector<bool>(s.surfaces.size(), true));
+    s.mass.volume = -s.mass.volume;
+    s.mass.inertia = -s.mass.inertia;
+  }
+  const double size = diagonal(s.patches);
+  if (!(s.mass.volume > 1e-12 * size * size * size)) {
+    throw ShapeError("the patches enclose no volume: " + number(s.mass.volume));
+  }
+  warn_of_turned(draft);
+}
+
+void move_to_center(Shape& s) {
+  for (BezierPatch& patch : s.patches) {
+    for (Vec4& p : patch.points) p.head<3>() -= p[3] * s.mass.center;
+  }
+}
+
+// Patch and parameters as the file counts them.
+std::string place(const Draft& draft, const SurfacePoint& at) {
+  const BezierPiece& piece = draft.pieces[at.patch];
+  double u = piece.u0 + at.u * (piece.u1 - piece.u0), v = piece.v0 + at.v * (piece.v1 - piece.v0);
+  const int surface = draft.shape.surface_of_patch[at.patch];
+  if (draft.turned[surface]) std::swap(u, v);
+  return "patch " + std::to_string(surface) + ", u=" + number(u) + ", v=" + number(v);
+}
+
+void check_convex(Draft& draft, const std::vector<SurfaceSample>& samples, const KinkSummary& kinks) {
+  Shape& s = draft.shape;
+  const Dent dent = find_dent(s, samples, kinks);
+  s.concavity = dent.depth;
+  s.support_excess = dent.excess;
+  const double allowed = kAllowedDent * s.bounding_radius;
+  if (dent.depth > allowed) {
+    throw ShapeError("not convex: " + place(draft, dent.where) + ", depth " + number(dent.depth) +
+                     " (allowed " + number(allowed) + ")");
+  }
+  if (dent.depth > kUnmentionedDent * s.bounding_radius) {
+    draft.warnings.push_back("not quite convex: " + place(draft, dent.where) + ", depth " +
+                             number(dent.depth) + "; contact bridges it with the convex hull");
+  }
+}
+
+void measure(Draft& draft) {
+  Shape& s = draft.shape;
+  const RadiusBounds radius = bound_radius(s.patches);
+  s.bounding_radius = radius.outer;
+  s.inner_radius = radius.inner;
+  const KinkSummary kinks = measure_kinks(s.patches, s.links);
+  s.smooth = std::max(kinks.convex, kinks.concave) <= kSmoothKink;
+  const std::vector<SurfaceSample> samples = sample_surface(s.patches);
+  check_convex(draft, samples, kinks);
+  s.patch_curvature = bound_patch_curvature(s.patches, samples);
+  if (s.inner_radius >= (1 - kSphere) * s.bounding_radius)
+    s.patch_curvature = {s.bounding_radius, s.bounding_radius};
+  s.curvature = add_kinks(s.patch_curvature, kinks);
+  measure_joint_distance(s);
+  build_normal_map(s);
+  for (const BezierPatch& patch : s.patches) s.curvature_rate.push_back(bound_curvature_rate(patch));
+}
+
+void set_gyration(Shape& s, const std::optional<Mat3>& given) {
+  s.gyration = given ? *given : Mat3(s.mass.inertia / s.mass.volume);
+  if (given && !given->allFinite()) throw ShapeError("gyration must be finite");
+  if (given && (*given - given->transpose()).cwiseAbs().maxCoeff() > 1e-12 * given->cwiseAbs().maxCoeff()) {
+    throw ShapeError("gyration must be symmetric");
+  }
+  const PrincipalFrame frame = principal_frame(s.gyration);
+  const Vec3& m = frame.moments;
+  const std::string values = number(m[0]) + ", " + number(m[1]) + ", " + number(m[2]);
+  if (given && !(m[0] > 0))
+    throw ShapeError("gyration must be positive definite: its eigenvalues are " + values);
+  if (given && m[2] > (m[0] + m[1]) * (1 + 1e-9)) {
+    throw ShapeError("gyration is not that of a body: its eigenvalues are " + values +
+                     ", the largest must not exceed the sum of the others");
+  }
+  s.principal_gyration = frame.moments;
+  s.principal_axes = frame.axes;
+}
+
+void build(Draft& draft, const std::optional<Mat3>& gyration) {
+  check_surfaces(draft.shape.surfaces);
+  split(draft);
+  connect(draft);
+  orient_and_weigh(draft);
+  move_to_center(draft.shape);
+  set_gyration(draft.shape, gyration);
+  measure(draft);
+  build_atlas(draft.shape, kAtlasCells);
+}
+
+}  // namespace
+
+std::shared_ptr<const Shape> make_shape(const std::string& name, std::vector<NurbsSurface> surfaces,
+                                        const std::optional<Mat3>& gyration,
+                                        std::vector<std::string>* warnings) {
+  Draft draft;
+  draft.shape.name = name;
+  draft.shape.surfaces = std::move(surfaces);
+  try {
+    build(draft, gyration);
+  } catch (const ShapeError& error) {
+    throw ShapeError(name + ": " + error.what());
+  }
+  if (warnings) {
+    for (const std::string& w : draft.warnings) warnings->emplace_back(name).append(": ").append(w);
+  }
+  return std::make_shared<const Shape>(std::move(draft.shape));
+}
+
+}  // namespace nurbs

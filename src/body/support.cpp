@@ -1,0 +1,397 @@
+// Projected Newton for the support mapping: maximise d . s(u, v) over one patch's unit square; where the
+// ascent leaves through an edge, continue in the neighbour if the ascent goes on there, otherwise stay on the
+// edge (one variable) or the corner (none).
+#include "body/support.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "nurbs/tolerances.h"
+
+namespace nurbs {
+namespace {
+
+// The end of edge `edge` in patch parameters, and which parameter is pinned on it.
+bool pins_u(int edge) {
+  return edge < 2;
+}
+double pinned_value(int edge) {
+  return (edge == 1 || edge == 3) ? 1.0 : 0.0;
+}
+
+// The same surface point seen from the patch across `edge`. `t` is the free parameter along the edge.
+SurfacePoint across(const EdgeLink& link, double t) {
+  SurfacePoint q;
+  q.patch = link.patch;
+  const double free = link.reversed ? 1.0 - t : t;
+  (pins_u(link.edge) ? q.u : q.v) = pinned_value(link.edge);
+  (pins_u(link.edge) ? q.v : q.u) = free;
+  return q;
+}
+
+// Slope of f along the unit tangent pointing into the patch from one of its edges.
+double inward_slope(const Jet1& jet, int edge, const Vec3& d) {
+  const Vec3& across_edge = pins_u(edge) ? jet.su : jet.sv;
+  const Vec3& along_edge = pins_u(edge) ? jet.sv : jet.su;
+  Vec3 t = across_edge;
+  const double along2 = along_edge.squaredNorm();
+  if (along2 > 0) t -= along_edge * (along_edge.dot(across_edge) / along2);
+  const double length = t.norm();
+  if (!(length > 0)) return 0;
+  const double slope = d.dot(t) / length;
+  return pinned_value(edge) > 0 ? -slope : slope;
+}
+
+// Whether f ascends into the patch from a point of its edge `edge`. At the patch's corner the way in is
+// narrower or wider than a right angle: there the other edge counts too, which two patches may share that a
+// third one sees across neither.
+bool ascends_into(const Jet1& jet, const SurfacePoint& at, int edge, const Vec3& d) {
+  if (inward_slope(jet, edge, d) > kSlopeTolerance) return true;
+  const double along = pins_u(edge) ? at.v : at.u;
+  if (along > kOnEdge && along < 1 - kOnEdge) return false;
+  const Vec3& other = pins_u(edge) ? jet.su : jet.sv;
+  const double slope = pinned_value(edge) > 0 ? -d.dot(other) : d.dot(other);
+  return slope > kSlopeTolerance * other.norm();
+}
+
+// At a pole the parametrisation is singular: among all patches that collapse there, finds the ray of steepest
+// ascent. Returns its slope (<= 0: the pole itself is the maximum) and where to go on.
+double leave_pole(const Shape& shape, const Vec3& pole, const Vec3& d, SurfacePoint* out) {
+  constexpr double kInside =
+      0.25;  // furthest from the pole, in parameters, at which the search is taken up again
+  double best = 0;
+  const double near = 1e-9 * shape.bounding_radius;
+  for (int p = 0; p < static_cast<int>(shape.patches.size()); ++p) {
+    for (int edge = 0; edge < 4; ++edge) {
+      if (!shape.links[p][edge].collapsed) continue;
+      for (const double t : {0.0, 0.25, 0.5, 0.75, 1.0}) {
+        SurfacePoint q{p, t, t};
+        (pins_u(edge) ? q.u : q.v) = pinned_value(edge);
+        const Jet2 jet = evaluate2(shape.patches[p], q.u, q.v);
+        if ((jet.s - pole).norm() > near) break;
+        const double slope = inward_slope({jet.s, jet.su, jet.sv}, edge, d);
+        if (slope <= best) continue;
+        best = slope;
+        *out = q;
+        // Where a parabola along the ray has its top: a start further out may overshoot the pole on its way
+        // back.
+        const double first = std::abs(d.dot(pins_u(edge) ? jet.su : jet.sv));
+        const double second = -d.dot(pins_u(edge) ? jet.suu : jet.svv);
+        const double inside = second > 0 ? std::min(kInside, first / second) : kInside;
+        (pins_u(edge) ? out->u : out->v) = pinned_value(edge) > 0 ? 1 - inside : inside;
+      }
+    }
+  }
+  return best;
+}
+
+// First and second derivatives of f = d . s, and the first fundamental form.
+struct Model {
+  double gu, gv, huu, huv, hvv, e, f, g;
+  Model(const Jet2& j, const Vec3& d)
+      : gu(d.dot(j.su)),
+        gv(d.dot(j.sv)),
+        huu(d.dot(j.suu)),
+        huv(d.dot(j.suv)),
+        hvv(d.dot(j.svv)),
+        e(j.su.squaredNorm()),
+        f(j.su.dot(j.sv)),
+        g(j.sv.squaredNorm()) {}
+};
+
+struct Step {
+  double du = 0, dv = 0;
+  double slope = 0;   // of f along the steepest free tangent direction
+  double length = 0;  // of the step on the surface
+};
+
+Step ascend_along(double g, double h, double metric) {
+  Step step;
+  if (!(metric > 0)) return step;
+  step.slope = std::abs(g) / std::sqrt(metric);
+  const double flat = 1e-12 * metric;
+  step.du = h < -flat ? -g / h : (g > 0 ? 1.0 : g < 0 ? -1.0 : 0.0);
+  step.du = std::clamp(step.du, -1.0, 1.0);
+  step.length = std::abs(step.du) * std::sqrt(metric);
+  return step;
+}
+
+// Newton step with the curvatures' absolute values, in an orthonormal frame of the tangent plane; along each
+// principal direction at most a parameter unit. (Steepest ascent zigzags for ever where a body bends sharply
+// one way and hardly the other.)
+void saddle_free_step(const Model& m, double area2, Step* step) {
+  const double shear = m.f / m.e, r = 1 / std::sqrt(m.e), s = std::sqrt(m.e / area2);
+  const double g1 = r * m.gu, g2 = s * (m.gv - shear * m.gu);
+  const double h11 = r * r * m.huu, h12 = r * s * (m.huv - shear * m.huu);
+  const double h22 = s * s * (m.hvv - 2 * shear * m.huv + shear * shear * m.huu);
+  const double mean = 0.5 * (h11 + h22), split = std::hypot(0.5 * (h11 - h22), h12);
+  const double angle = 0.5 * std::atan2(2 * h12, h11 - h22), c = std::cos(angle), sn = std::sin(angle);
+  const auto go = [&](double x, double y, double curvature) {
+    const double slope = g1 * x + g2 * y, du = r * x - shear * s * y, dv = s * y;
+    const double farthest = 1 / std::max(std::abs(du), std::abs(dv));
+    const double newton = std::abs(curvature) * farthest > std::abs(slope) ? slope / std::abs(curvature)
+                                                                           : std::copysign(farthest, slope);
+    step->du += newton * du;
+    step->dv += newton * dv;
+  };
+  go(c, sn, mean + split);
+  go(-sn, c, mean - split);
+}
+
+// Newton step on the free parameters; where the Hessian is not negative definite, a saddle-free one.
+Step ascend(const Model& m, bool free_u, bool free_v) {
+  if (!free_u && !free_v) return {};
+  if (!free_v) return ascend_along(m.gu, m.huu, m.e);
+  if (!free_u) {
+    Step step = ascend_along(m.gv, m.hvv, m.g);
+    std::swap(step.du, step.dv);
+    return step;
+  }
+  const double area2 = m.e * m.g - m.f * m.f;
+  if (!(area2 > 1e-24 * m.e * m.g) ||
+      std::min(m.e, m.g) <
+          kPoleMetric *
+              std::max(m.e, m.g)) {  // a degenerate point: only the non-vanishing direction is usable
+    if (m.e > m.g) return ascend_along(m.gu, m.huu, m.e);
+    Step step = ascend_along(m.gv, m.hvv, m.g);
+    std::swap(step.du, step.dv);
+    return step;
+  }
+  Step step;
+  const double slope2 = (m.g * m.gu * m.gu - 2 * m.f * m.gu * m.gv + m.e * m.gv * m.gv) / area2;
+  step.slope = std::sqrt(std::max(0.0, slope2));
+  const double det = m.huu * m.hvv - m.huv * m.huv;
+  if (m.huu < 0 && det > 1e-12 * area2 * kFlatHessian) {
+    step.du = (-m.hvv * m.gu + m.huv * m.gv) / det;
+    step.dv = (m.huv * m.gu - m.huu * m.gv) / det;
+  } else {
+    saddle_free_step(m, area2, &step);
+  }
+  const double largest = std::max(std::abs(step.du), std::abs(step.dv));
+  if (largest > 1) {
+    step.du /= largest;
+    step.dv /= largest;
+  }
+  step.length = std::sqrt(
+      std::max(0.0, m.e * step.du * step.du + 2 * m.f * step.du * step.dv + m.g * step.dv * step.dv));
+  return step;
+}
+
+// Edge through which the ascent would leave the patch at a boundary point, or -1; skips edges in `closed`.
+int leaving_edge(const SurfacePoint& at, const Model& m, unsigned closed) {
+  if (at.u <= kOnEdge && m.gu < 0 && !(closed & 1u)) return 0;
+  if (at.u >= 1 - kOnEdge && m.gu > 0 && !(closed & 2u)) return 1;
+  if (at.v <= kOnEdge && m.gv < 0 && !(closed & 4u)) return 2;
+  if (at.v >= 1 - kOnEdge && m.gv > 0 && !(closed & 8u)) return 3;
+  return -1;
+}
+
+// Share of a step in one parameter that stays inside [0, 1].
+double share_inside(double x, double dx) {
+  if (x + dx < 0) return x / -dx;
+  if (x + dx > 1) return (1 - x) / dx;
+  return 1;
+}
+
+// Newton step that does not leave at once through an edge `at` lies on: if it would, though the gradient
+// points inward, first along the edge alone. (With no slope left along the edge the full step points inward.)
+Step inward_step(const Model& m, const SurfacePoint& at, bool free_u, bool free_v) {
+  const Step step = ascend(m, free_u, free_v);
+  const auto leaves = [](double x, double dx) {
+    return (x <= kOnEdge && dx < 0) || (x >= 1 - kOnEdge && dx > 0);
+  };
+  const bool leaves_u = leaves(at.u, step.du), leaves_v = leaves(at.v, step.dv);
+  if (!leaves_u && !leaves_v) return step;
+  Step along = ascend(m, free_u && !leaves_u, free_v && !leaves_v);
+  along.slope = step.slope;
+  return along;
+}
+
+// A pole of the patch, if it has one: the middle of a collapsed edge.
+bool find_pole(const Shape& shape, int patch, SurfacePoint* pole) {
+  for (int edge = 0; edge < 4; ++edge) {
+    if (!shape.links[patch][edge].collapsed) continue;
+    *pole = {patch, 0.5, 0.5};
+    (pins_u(edge) ? pole->u : pole->v) = pinned_value(edge);
+    return true;
+  }
+  return false;
+}
+
+// h(d) over d . (surface point), from the point's normal n.
+double excess_of(const Shape& shape, const Vec3& d, const Vec3& n) {
+  return rolling_excess(shape.curvature.max_radius, shape.bounding_radius, (d - n).squaredNorm());
+}
+
+// Next to a pole normals are lost to round-off. The bound then comes from a surface point a little further
+// in, or from the pole itself, where the normal has a limit.
+double polar_upper_bound(const Shape& shape, const Vec3& d, const SurfacePoint& at) {
+  SurfacePoint in = at, pole = at;
+  in.u += in.u < 0.5 ? kPoleOffset : -kPoleOffset;
+  in.v += in.v < 0.5 ? kPoleOffset : -kPoleOffset;
+  const Jet1 jet = evaluate1(shape.patches[at.patch], in.u, in.v);
+  double upper = d.dot(jet.s) + excess_of(shape, d, jet.su.cross(jet.sv).normalized());
+  if (find_pole(shape, at.patch, &pole)) {
+    const Jet2 j = evaluate2(shape.patches[at.patch], pole.u, pole.v);
+    Vec3 n = j.su.squaredNorm() < j.sv.squaredNorm() ? j.suv.cross(j.sv) : j.su.cross(j.suv);
+    if (std::max(pole.u, pole.v) == 1) n = -n;
+    upper = std::min(upper, d.dot(j.s) + excess_of(shape, d, n.normalized()));
+  }
+  return upper + shape.support_excess + kRoundoff * shape.bounding_radius;
+}
+
+double upper_bound(const Shape& shape, double f, double slope) {
+  const double r = shape.bounding_radius;
+  double excess = 2 * r * slope;
+  if (std::isfinite(shape.curvature.max_radius))
+    excess = std::min(excess, shape.curvature.max_radius * slope * slope);  // P (1 - cos) <= P sin^2
+  return f + excess + shape.support_excess + kRoundoff * r;
+}
+
+// Ascent from `at` to a local maximum of d . s.
+Support climb(const Shape& shape, const Vec3& d, SurfacePoint at) {
+  Support best;
+  const double size = shape.bounding_radius;
+  const double least_gain = kRoundoff * size;
+  Jet2 jet = evaluate2(shape.patches[at.patch], at.u, at.v);
+  double f = d.dot(jet.s);
+  double slope = 1;
+  int polar_restarts = 0;
+  for (best.iterations = 1; best.iterations < kSupportIterations; ++best.iterations) {
+    const Model model(jet, d);
+    unsigned closed = 0;  // edges through which the ascent does not continue
+    bool moved = false;
+    for (int edge; (edge = leaving_edge(at, model, closed)) >= 0;) {
+      closed |= 1u << edge;
+      const EdgeLink& link = shape.links[at.patch][edge];
+      SurfacePoint q;
+      if (link.collapsed) {
+        if (polar_restarts >= kPolarRestarts || leave_pole(shape, jet.s, d, &q) < kSlopeTolerance) continue;
+        ++polar_restarts;
+        moved = true;
+      } else if (link.patch >= 0) {
+        q = across(link, pins_u(edge) ? at.v : at.u);
+        const Jet1 there = evaluate1(shape.patches[q.patch], q.u, q.v);
+        moved = ascends_into(there, q, link.edge, d);
+      }
+      if (!moved) continue;
+      at = q;
+      jet = evaluate2(shape.patches[at.patch], at.u, at.v);
+      f = d.dot(jet.s);
+      break;
+    }
+    if (moved) continue;
+    const Step step = inward_step(model, at, !(closed & 3u), !(closed & 12u));
+    slope = step.slope;
+    if (step.length <= kStepTolerance * size || step.slope <= kSlopeTolerance) {
+      best.converged = true;
+      break;
+    }
+    bool gained = false;
+    // Cut where it meets an edge, not clamped: a clamped Newton step need not ascend.
+    double scale = std::min(share_inside(at.u, step.du), share_inside(at.v, step.dv));
+    for (int halving = 0; halving < 40; ++halving, scale *= 0.5) {
+      SurfacePoint q = at;
+      q.u = std::clamp(at.u + scale * step.du, 0.0, 1.0);
+      q.v = std::clamp(at.v + scale * step.dv, 0.0, 1.0);
+      const Jet2 there = evaluate2(shape.patches[q.patch], q.u, q.v);
+      const double f_there = d.dot(there.s);
+      // Sufficient ascent (Nocedal & Wright, eq. 3.6a), up to round-off.
+      if (f_there < f + kSufficientAscent * scale * (model.gu * step.du + model.gv * step.dv) - least_gain)
+        continue;
+      gained = f_there > f || halving == 0;
+      at = q;
+      jet = there;
+      f = f_there;
+      break;
+    }
+    if (!gained) {  // no ascent above round-off left
+      best.converged = true;
+      break;
+    }
+  }
+  best.where = at;
+  best.slope = slope;
+  best.point = jet.s;
+  best.h = f;
+  const double lu = jet.su.squaredNorm(), lv = jet.sv.squaredNorm();
+  const bool polar = std::min(lu, lv) < kPoleOffset * kPoleOffset * std::max(lu, lv);
+  best.upper = polar ? std::max(f, polar_upper_bound(shape, d, at)) : upper_bound(shape, f, slope);
+  return best;
+}
+
+}  // namespace
+
+Support find_support(const Shape& shape, const Vec3& d, const SurfacePoint* start) {
+  Support best = climb(shape, d, start ? *start : shape.atlas.where[shape.atlas.nearest(d)]);
+  SurfacePoint from;
+  if (best.converged || !find_pole(shape, best.where.patch, &from)) return best;
+  // Lost on the wrong side of a pole, on a body nearly flat there: straight from the pole the right way.
+  const Vec3 pole = evaluate0(shape.patches[from.patch], from.u, from.v);
+  leave_pole(shape, pole, d, &from);
+  const Support other = climb(shape, d, from);
+  const int iterations = best.iterations + other.iterations;
+  if (other.h >= best.h) best = other;
+  best.iterations = iterations;
+  return best;
+}
+
+Support find_hull_support(const Shape& shape, const Vec3& d, const SurfacePoint* start) {
+  Support best = find_support(shape, d, start);
+  if (!shape.dented()) return best;
+  const double radius = shape.normal_map.radius_at(d);
+  if (radius < kFarAway && best.converged && best.slope < 0.5 * kNormalMargin) {
+    // No dent near d: the only point with this normal.
+    best.upper = best.h + radius * best.slope * best.slope + kRoundoff * shape.bounding_radius;
+    return best;
+  }
+  int nodes[4];
+  shape.atlas.cell(d, nodes);
+  for (const int node : nodes) {
+    const Support other = find_support(shape, d, &shape.atlas.where[node]);
+    const int iterations = best.iterations + other.iterations;
+    const bool same = (other.point - best.point).norm() <= kSameSupport * shape.bounding_radius;
+    const double rival = same ? best.rival : std::max(best.rival, std::min(best.h, other.h));
+    if (other.h > best.h) best = other;
+    best.iterations = iterations;
+    best.rival = rival;
+  }
+  best.upper -= shape.support_excess;
+  return best;
+}
+
+SurfacePoint walk(const Shape& shape, SurfacePoint at, double du, double dv) {
+  for (int crossing = 0; crossing < 4; ++crossing) {
+    // Fraction of the step at which it meets the first edge.
+    double fraction = 1;
+    int edge = -1;
+    const auto meet = [&](double x, double dx, int low_edge) {
+      const double to = dx < 0 ? -x / dx : dx > 0 ? (1 - x) / dx : 2;
+      if (to < fraction) {
+        fraction = std::max(0.0, to);
+        edge = low_edge + (dx > 0);
+      }
+    };
+    meet(at.u, du, 0);
+    meet(at.v, dv, 2);
+    at.u = std::clamp(at.u + fraction * du, 0.0, 1.0);
+    at.v = std::clamp(at.v + fraction * dv, 0.0, 1.0);
+    if (edge < 0) return at;
+    const EdgeLink& link = shape.links[at.patch][edge];
+    if (link.patch < 0 || link.collapsed) return at;
+    // The rest of the step, as a tangent vector, in the neighbour's parameters.
+    const Jet1 here = evaluate1(shape.patches[at.patch], at.u, at.v);
+    const Vec3 rest = (1 - fraction) * (du * here.su + dv * here.sv);
+    at = across(link, pins_u(edge) ? at.v : at.u);
+    const Jet1 there = evaluate1(shape.patches[at.patch], at.u, at.v);
+    const double e = there.su.squaredNorm(), f = there.su.dot(there.sv), g = there.sv.squaredNorm();
+    const double area2 = e * g - f * f;
+    if (!(area2 > 0)) return at;
+    const double a = there.su.dot(rest), b = there.sv.dot(rest);
+    du = std::clamp((g * a - f * b) / area2, -1.0, 1.0);
+    dv = std::clamp((e * b - f * a) / area2, -1.0, 1.0);
+  }
+  return at;
+}
+
+}  // namespace nurbs

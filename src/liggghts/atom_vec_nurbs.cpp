@@ -1,0 +1,610 @@
+// atom_style nurbs. See atom_vec_nurbs.h; file formats are in the README, "Data files".
+#include "liggghts/atom_vec_nurbs.h"
+
+#include <cmath>
+#include <cstdio>
+#include <cstdlib>
+#include <limits>
+#include <vector>
+
+#include "atom.h"
+#include "comm.h"
+#include "domain.h"
+#include "error.h"
+#include "fix.h"
+#include "lammps.h"
+#include "liggghts/host_error.h"
+#include "memory.h"
+#include "modify.h"
+
+namespace LAMMPS_NS {
+
+using nurbs::Quat;
+using nurbs::Vec3;
+
+namespace {
+
+constexpr int kGrowth = 10000;  // particles added to the arrays at a time, as in the host
+
+// Doubles per particle in the messages of the style (the host sizes its buffers by them).
+constexpr int kPosition = 3, kOrientation = 4, kVelocity = 6, kForce = 6;
+constexpr int kIds = 3;   // tag, type, mask
+constexpr int kBody = 5;  // shape number, scale, density, radius, mass
+constexpr int kMomentum = 3;
+constexpr int kState =
+    1 + kPosition + kIds + 1 + kOrientation + kVelocity + kMomentum + kBody;  // count first; ids and image
+
+// 2 ulp: a quaternion this close to a unit one was normalised before, and is kept bit for bit.
+constexpr double kUnitTolerance = 8 * std::numeric_limits<double>::epsilon();
+
+Quat to_quat(const double* q) {
+  return Quat(q[0], q[1], q[2], q[3]);
+}
+
+Quat normalised(const Quat& q) {
+  return std::abs(q.squaredNorm() - 1) <= kUnitTolerance ? q : q.normalized();
+}
+
+// Reads a whole word as a finite number.
+bool parse(const char* word, double& value) {
+  char* end = nullptr;
+  value = std::strtod(word, &end);
+  return end != word && *end == '\0' && std::isfinite(value);
+}
+
+// Reads a whole word as an integer.
+bool parse(const char* word, int& value) {
+  char* end = nullptr;
+  const long number = std::strtol(word, &end, 10);
+  value = static_cast<int>(number);
+  return end != word && *end == '\0' && value == number;
+}
+
+// Mass the host's `set density` and `set diameter` give a particle: that of its bounding sphere.
+double sphere_mass(double radius, double density) {
+  return 4.0 * M_PI / 3.0 * radius * radius * radius * density;
+}
+
+bool close(double a, double b) {
+  return std::abs(a - b) <= 1e-14 * std::abs(b);
+}
+
+}  // namespace
+
+AtomVecNurbs* AtomVecNurbs::require(LAMMPS* lmp, const std::string& user) {
+  auto* style = dynamic_cast<AtomVecNurbs*>(lmp->atom->avec);
+  if (style == nullptr) nurbs_host::fail_all(FLERR, lmp, user + " requires atom_style nurbs");
+  return style;
+}
+
+AtomVecNurbs::AtomVecNurbs(LAMMPS* lmp) : AtomVec(lmp), shapes_(lmp) {
+  molecular = 0;
+  comm_x_only = 0;
+  comm_f_only = 0;
+  size_forward = kPosition + kOrientation;
+  size_reverse = kForce;
+  size_border = kPosition + kIds + kBody + kOrientation;
+  size_velocity = kVelocity;
+  size_data_atom = 12;
+  size_data_vel = 7;
+  xcol_data = 6;
+
+  // Not sphere_flag: what the host offers for spheres alone (fix nve/sphere, compute erotate/sphere, ...)
+  // must refuse these particles. shapetype_flag is what the host's PairGran asks of non-spherical ones.
+  atom->shapetype_flag = 1;
+  atom->radius_flag = atom->rmass_flag = atom->density_flag = 1;
+  atom->omega_flag = atom->torque_flag = 1;
+}
+
+AtomVecNurbs::~AtomVecNurbs() {
+  memory->destroy(scale_);
+}
+
+nurbs::Particle AtomVecNurbs::particle(int i) const {
+  nurbs::Particle particle;
+  particle.shape = shape(i);
+  particle.scale = scale_[i];
+  particle.x = Vec3(x_[i][0], x_[i][1], x_[i][2]);
+  particle.q = to_quat(quaternion_[i]);
+  return particle;
+}
+
+Vec3 AtomVecNurbs::principal_inertia(int i) const {
+  return rmass_[i] * scale_[i] * scale_[i] * shape(i)->principal_gyration;
+}
+
+Vec3 AtomVecNurbs::angular_momentum(int i) const {
+  const Vec3 omega = Vec3::Map(omega_[i]), kept = Vec3::Map(angmom_[i]), inertia = principal_inertia(i);
+  const Quat q = to_quat(quaternion_[i]);
+  const Quat& axes = shape(i)->principal_axes;
+  if (nurbs::angular_velocity(kept, q, axes, inertia) == omega) return kept;
+  return nurbs::angular_momentum(omega, q, axes, inertia);
+}
+
+void AtomVecNurbs::set_angular_momentum(int i, const Vec3& momentum) {
+  Vec3::Map(angmom_[i]) = momentum;
+  Vec3::Map(omega_[i]) = nurbs::angular_velocity(momentum, to_quat(quaternion_[i]), shape(i)->principal_axes,
+                                                 principal_inertia(i));
+}
+
+void AtomVecNurbs::rotate(int i, nurbs::RotationScheme scheme, const Vec3& momentum, double dt) {
+  Quat q = to_quat(quaternion_[i]);
+  nurbs::rotate_free(scheme, principal_inertia(i), shape(i)->principal_axes, dt, q, momentum);
+  put_quaternion(i, q);
+  set_angular_momentum(i, momentum);
+}
+
+void AtomVecNurbs::set_body(int i, int shape_number, double scale, double density, const Quat& orientation) {
+  shapetype_[i] = shape_number;
+  scale_[i] = scale;
+  density_[i] = density;
+  put_quaternion(i, normalised(orientation));
+  update_size(i);
+}
+
+void AtomVecNurbs::put_quaternion(int i, const Quat& q) {
+  quaternion_[i][0] = q.w();
+  quaternion_[i][1] = q.x();
+  quaternion_[i][2] = q.y();
+  quaternion_[i][3] = q.z();
+}
+
+// Mass and bounding radius from shape, scale and density.
+void AtomVecNurbs::update_size(int i) {
+  const nurbs::Shape& body = *shape(i);
+  radius_[i] = scale_[i] * body.bounding_radius;
+  rmass_[i] = density_[i] * body.mass.volume * scale_[i] * scale_[i] * scale_[i];
+}
+
+void AtomVecNurbs::settings(int narg, char** arg) {
+  if (atom->avec != this)
+    nurbs_host::fail_all(FLERR, lmp, "atom_style nurbs cannot be part of atom_style hybrid");
+  // read_restart creates the style without arguments and then calls read_restart_settings.
+  if (arg == nullptr) return;
+  if (narg < 1)
+    nurbs_host::fail_all(FLERR, lmp,
+                         "atom_style nurbs needs at least one shape file: atom_style nurbs FILE [FILE ...]");
+  shapes_.read_files(std::vector<std::string>(arg, arg + narg));
+}
+
+void AtomVecNurbs::init() {
+  AtomVec::init();
+  if (domain->dimension != 3) nurbs_host::fail_all(FLERR, lmp, "atom_style nurbs needs a 3d simulation");
+  if (domain->is_wedge) nurbs_host::fail_all(FLERR, lmp, "atom_style nurbs cannot be used in a wedge domain");
+  if (shapes_.count() == 0) nurbs_host::fail_all(FLERR, lmp, "atom_style nurbs has no shapes");
+  refuse_insertion();
+  for (int i = 0; i < atom->nlocal; ++i) follow_set_command(i);
+  if (const std::string bad = check_all_owned(); !bad.empty()) nurbs_host::fail_one(lmp, bad);
+}
+
+// The host inserts when a run begins, after init.
+void AtomVecNurbs::refuse_insertion() {
+  if (const char* style = nurbs_host::fix_style_with(lmp, "insert/"))
+    nurbs_host::fail_all(
+        FLERR, lmp,
+        std::string("Fix ") + style +
+            " inserts spheres and can't be used with atom_style nurbs; give the particles in "
+            "a data file (read_data) or by create_atoms");
+}
+
+// The host's `set` command treats a particle as a sphere. `set diameter` (of the bounding sphere) means a
+// scale here, `set density` a mass, `set mass` a density.
+void AtomVecNurbs::follow_set_command(int i) {
+  const nurbs::Shape& body = *shape(i);
+  if (!close(radius_[i], scale_[i] * body.bounding_radius)) scale_[i] = radius_[i] / body.bounding_radius;
+  const double volume = body.mass.volume * scale_[i] * scale_[i] * scale_[i];
+  const bool mass_was_set =
+      !close(rmass_[i], density_[i] * volume) && !close(rmass_[i], sphere_mass(radius_[i], density_[i]));
+  if (mass_was_set) density_[i] = rmass_[i] / volume;
+  update_size(i);
+}
+
+// What a `set` command can have spoilt; empty when all is well.
+std::string AtomVecNurbs::check_all_owned() const {
+  for (int i = 0; i < atom->nlocal; ++i) {
+    const std::string who = "Atom " + std::to_string(tag_[i]) + ": ";
+    if (!(scale_[i] > 0)) return who + "scale " + nurbs_host::show(scale_[i]) + " must be > 0";
+    if (!(density_[i] > 0)) return who + "density " + nurbs_host::show(density_[i]) + " must be > 0";
+  }
+  return "";
+}
+
+void AtomVecNurbs::grow(int n) {
+  nmax = n == 0 ? nmax + kGrowth : n;
+  atom->nmax = nmax;
+  if (nmax < 0 || nmax > MAXSMALLINT) error->one(FLERR, "Per-processor system is too big");
+
+  memory->grow(atom->tag, nmax, "atom:tag");
+  memory->grow(atom->type, nmax, "atom:type");
+  memory->grow(atom->mask, nmax, "atom:mask");
+  memory->grow(atom->image, nmax, "atom:image");
+  memory->grow(atom->x, nmax, 3, "atom:x");
+  memory->grow(atom->v, nmax, 3, "atom:v");
+  memory->grow(atom->f, nmax * comm->nthreads, 3, "atom:f");
+  memory->grow(atom->radius, nmax, "atom:radius");
+  memory->grow(atom->density, nmax, "atom:density");
+  memory->grow(atom->rmass, nmax, "atom:rmass");
+  memory->grow(atom->omega, nmax, 3, "atom:omega");
+  memory->grow(atom->angmom, nmax, 3, "atom:angmom");
+  memory->grow(atom->torque, nmax * comm->nthreads, 3, "atom:torque");
+  memory->grow(atom->quaternion, nmax, 4, "atom:quaternion");
+  memory->grow(atom->shapetype, nmax, "atom:shapetype");
+  memory->grow(scale_, nmax, "atom:scale");
+  grow_reset();
+
+  for (int k = 0; k < atom->nextra_grow; ++k) modify->fix[atom->extra_grow[k]]->grow_arrays(nmax);
+}
+
+void AtomVecNurbs::grow_reset() {
+  tag_ = atom->tag;
+  type_ = atom->type;
+  mask_ = atom->mask;
+  image_ = atom->image;
+  x_ = atom->x;
+  v_ = atom->v;
+  f_ = atom->f;
+  radius_ = atom->radius;
+  density_ = atom->density;
+  rmass_ = atom->rmass;
+  omega_ = atom->omega;
+  angmom_ = atom->angmom;
+  torque_ = atom->torque;
+  quaternion_ = atom->quaternion;
+  shapetype_ = atom->shapetype;
+}
+
+void AtomVecNurbs::copy(int from, int to, int delflag) {
+  double state[kState];
+  put_state(from, state);
+  get_state(to, state);
+  for (int k = 0; k < atom->nextra_grow; ++k)
+    modify->fix[atom->extra_grow[k]]->copy_arrays(from, to, delflag);
+}
+
+AtomVecNurbs::ImageShift AtomVecNurbs::image_shift(int pbc_flag, const int* pbc, Stage stage) const {
+  ImageShift shift;
+  if (pbc_flag == 0) return shift;
+  if (!domain->triclinic)
+    shift.x = Vec3(pbc[0] * domain->xprd, pbc[1] * domain->yprd, pbc[2] * domain->zprd);
+  else if (stage == Stage::border)
+    shift.x = Vec3(pbc[0], pbc[1], pbc[2]);  // borders are exchanged in lamda coordinates
+  else
+    shift.x = Vec3(pbc[0] * domain->xprd + pbc[5] * domain->xy + pbc[4] * domain->xz,
+                   pbc[1] * domain->yprd + pbc[3] * domain->yz, pbc[2] * domain->zprd);
+  if (deform_vremap)
+    shift.v = Vec3(pbc[0] * h_rate[0] + pbc[5] * h_rate[5] + pbc[4] * h_rate[4],
+                   pbc[1] * h_rate[1] + pbc[3] * h_rate[3], pbc[2] * h_rate[2]);
+  return shift;
+}
+
+// put_x appends particle i's x at p and returns the end; get_x reads it back.
+
+double* AtomVecNurbs::put_position(int i, const ImageShift& shift, double* p) const {
+  for (int k = 0; k < 3; ++k) *p++ = x_[i][k] + shift.x[k];
+  return p;
+}
+
+double* AtomVecNurbs::get_position(int i, double* p) {
+  for (int k = 0; k < 3; ++k) x_[i][k] = *p++;
+  return p;
+}
+
+double* AtomVecNurbs::put_orientation(int i, double* p) const {
+  for (int k = 0; k < 4; ++k) *p++ = quaternion_[i][k];
+  return p;
+}
+
+double* AtomVecNurbs::get_orientation(int i, double* p) {
+  for (int k = 0; k < 4; ++k) quaternion_[i][k] = *p++;
+  return p;
+}
+
+double* AtomVecNurbs::put_velocity(int i, const ImageShift& shift, double* p) const {
+  const double factor = (mask_[i] & deform_groupbit) ? 1 : 0;
+  for (int k = 0; k < 3; ++k) *p++ = v_[i][k] + factor * shift.v[k];
+  for (int k = 0; k < 3; ++k) *p++ = omega_[i][k];
+  return p;
+}
+
+double* AtomVecNurbs::get_velocity(int i, double* p) {
+  for (int k = 0; k < 3; ++k) v_[i][k] = *p++;
+  for (int k = 0; k < 3; ++k) omega_[i][k] = *p++;
+  return p;
+}
+
+double* AtomVecNurbs::put_body(int i, double* p) const {
+  *p++ = ubuf(shapetype_[i]).d;
+  *p++ = scale_[i];
+  *p++ = density_[i];
+  *p++ = radius_[i];
+  *p++ = rmass_[i];
+  return p;
+}
+
+double* AtomVecNurbs::get_body(int i, double* p) {
+  shapetype_[i] = static_cast<int>(ubuf(*p++).i);
+  scale_[i] = *p++;
+  density_[i] = *p++;
+  radius_[i] = *p++;
+  rmass_[i] = *p++;
+  return p;
+}
+
+// All that makes a particle; position first, as the host's exchange and read_restart expect. Leaves p[0] to
+// the count.
+double* AtomVecNurbs::put_state(int i, double* p) const {
+  p = put_position(i, {}, p + 1);
+  *p++ = ubuf(tag_[i]).d;
+  *p++ = ubuf(type_[i]).d;
+  *p++ = ubuf(mask_[i]).d;
+  *p++ = ubuf(image_[i]).d;
+  for (int k = 0; k < 3; ++k) *p++ = angmom_[i][k];
+  return put_body(i, put_velocity(i, {}, put_orientation(i, p)));
+}
+
+double* AtomVecNurbs::get_state(int i, double* p) {
+  p = get_position(i, p + 1);
+  tag_[i] = static_cast<int>(ubuf(*p++).i);
+  type_[i] = static_cast<int>(ubuf(*p++).i);
+  mask_[i] = static_cast<int>(ubuf(*p++).i);
+  image_[i] = static_cast<tagint>(ubuf(*p++).i);
+  for (int k = 0; k < 3; ++k) angmom_[i][k] = *p++;
+  return get_body(i, get_velocity(i, get_orientation(i, p)));
+}
+
+int AtomVecNurbs::pack_comm(int n, int* list, double* buf, int pbc_flag, int* pbc) {
+  const ImageShift shift = image_shift(pbc_flag, pbc, Stage::comm);
+  double* p = buf;
+  for (int k = 0; k < n; ++k) p = put_orientation(list[k], put_position(list[k], shift, p));
+  return static_cast<int>(p - buf);
+}
+
+void AtomVecNurbs::unpack_comm(int n, int first, double* buf) {
+  for (int i = first; i < first + n; ++i) buf = get_orientation(i, get_position(i, buf));
+}
+
+int AtomVecNurbs::pack_comm_vel(int n, int* list, double* buf, int pbc_flag, int* pbc) {
+  const ImageShift shift = image_shift(pbc_flag, pbc, Stage::comm);
+  double* p = buf;
+  for (int k = 0; k < n; ++k)
+    p = put_velocity(list[k], shift, put_orientation(list[k], put_position(list[k], shift, p)));
+  return static_cast<int>(p - buf);
+}
+
+void AtomVecNurbs::unpack_comm_vel(int n, int first, double* buf) {
+  for (int i = first; i < first + n; ++i) buf = get_velocity(i, get_orientation(i, get_position(i, buf)));
+}
+
+int AtomVecNurbs::pack_reverse(int n, int first, double* buf) {
+  double* p = buf;
+  for (int i = first; i < first + n; ++i) {
+    for (int k = 0; k < 3; ++k) *p++ = f_[i][k];
+    for (int k = 0; k < 3; ++k) *p++ = torque_[i][k];
+  }
+  return static_cast<int>(p - buf);
+}
+
+void AtomVecNurbs::unpack_reverse(int n, int* list, double* buf) {
+  for (int j = 0; j < n; ++j) {
+    for (int k = 0; k < 3; ++k) f_[list[j]][k] += *buf++;
+    for (int k = 0; k < 3; ++k) torque_[list[j]][k] += *buf++;
+  }
+}
+
+double* AtomVecNurbs::put_border(int n, const int* list, const ImageShift& shift, bool velocity,
+                                 double* p) const {
+  for (int k = 0; k < n; ++k) {
+    const int i = list[k];
+    p = put_position(i, shift, p);
+    *p++ = ubuf(tag_[i]).d;
+    *p++ = ubuf(type_[i]).d;
+    *p++ = ubuf(mask_[i]).d;
+    p = put_orientation(i, put_body(i, p));
+    if (velocity) p = put_velocity(i, shift, p);
+  }
+  for (int k = 0; k < atom->nextra_border; ++k)
+    p += modify->fix[atom->extra_border[k]]->pack_border(n, const_cast<int*>(list), p);
+  return p;
+}
+
+double* AtomVecNurbs::get_border(int n, int first, bool velocity, double* p) {
+  for (int i = first; i < first + n; ++i) {
+    if (i == nmax) grow(0);
+    p = get_position(i, p);
+    tag_[i] = static_cast<int>(ubuf(*p++).i);
+    type_[i] = static_cast<int>(ubuf(*p++).i);
+    mask_[i] = static_cast<int>(ubuf(*p++).i);
+    p = get_orientation(i, get_body(i, p));
+    if (velocity) p = get_velocity(i, p);
+  }
+  for (int k = 0; k < atom->nextra_border; ++k)
+    p += modify->fix[atom->extra_border[k]]->unpack_border(n, first, p);
+  return p;
+}
+
+int AtomVecNurbs::pack_border(int n, int* list, double* buf, int pbc_flag, int* pbc) {
+  return static_cast<int>(put_border(n, list, image_shift(pbc_flag, pbc, Stage::border), false, buf) - buf);
+}
+
+int AtomVecNurbs::pack_border_vel(int n, int* list, double* buf, int pbc_flag, int* pbc) {
+  return static_cast<int>(put_border(n, list, image_shift(pbc_flag, pbc, Stage::border), true, buf) - buf);
+}
+
+void AtomVecNurbs::unpack_border(int n, int first, double* buf) {
+  get_border(n, first, false, buf);
+}
+
+void AtomVecNurbs::unpack_border_vel(int n, int first, double* buf) {
+  get_border(n, first, true, buf);
+}
+
+int AtomVecNurbs::pack_exchange(int i, double* buf) {
+  double* p = put_state(i, buf);
+  for (int k = 0; k < atom->nextra_grow; ++k) p += modify->fix[atom->extra_grow[k]]->pack_exchange(i, p);
+  buf[0] = static_cast<double>(p - buf);
+  return static_cast<int>(p - buf);
+}
+
+int AtomVecNurbs::unpack_exchange(double* buf) {
+  const int i = atom->nlocal;
+  if (i == nmax) grow(0);
+  double* p = get_state(i, buf);
+  for (int k = 0; k < atom->nextra_grow; ++k) p += modify->fix[atom->extra_grow[k]]->unpack_exchange(i, p);
+  ++atom->nlocal;
+  return static_cast<int>(p - buf);
+}
+
+int AtomVecNurbs::size_restart() {
+  int n = kState * atom->nlocal;
+  for (int k = 0; k < atom->nextra_restart; ++k)
+    for (int i = 0; i < atom->nlocal; ++i) n += modify->fix[atom->extra_restart[k]]->size_restart(i);
+  return n;
+}
+
+int AtomVecNurbs::pack_restart(int i, double* buf) {
+  double* p = put_state(i, buf);
+  for (int k = 0; k < atom->nextra_restart; ++k) p += modify->fix[atom->extra_restart[k]]->pack_restart(i, p);
+  buf[0] = static_cast<double>(p - buf);
+  return static_cast<int>(p - buf);
+}
+
+int AtomVecNurbs::unpack_restart(double* buf) {
+  const int i = atom->nlocal;
+  if (i == nmax) {
+    grow(0);
+    if (atom->nextra_store) memory->grow(atom->extra, nmax, atom->nextra_store, "atom:extra");
+  }
+  double* p = get_state(i, buf);
+  if (atom->nextra_store) {
+    const int extra = static_cast<int>(buf[0]) - static_cast<int>(p - buf);
+    for (int k = 0; k < extra; ++k) atom->extra[i][k] = *p++;
+  }
+  ++atom->nlocal;
+  return static_cast<int>(p - buf);
+}
+
+// A new owned particle at rest, its body not yet set; returns its index.
+int AtomVecNurbs::append_atom(int type, const double* coord, tagint image) {
+  const int i = atom->nlocal;
+  if (i == nmax) grow(0);
+  tag_[i] = 0;
+  type_[i] = type;
+  mask_[i] = 1;
+  image_[i] = image;
+  for (int k = 0; k < 3; ++k) {
+    x_[i][k] = coord[k];
+    v_[i][k] = omega_[i][k] = angmom_[i][k] = 0;
+  }
+  ++atom->nlocal;
+  return i;
+}
+
+void AtomVecNurbs::create_atom(int type, double* coord) {
+  constexpr tagint home =
+      (static_cast<tagint>(IMGMAX) << IMG2BITS) | (static_cast<tagint>(IMGMAX) << IMGBITS) | IMGMAX;
+  set_body(append_atom(type, coord, home), 1, 1, 1, Quat::Identity());
+}
+
+// values: id type shape scale density x y z qw qx qy qz
+void AtomVecNurbs::data_atom(double* coord, tagint image, char** values) {
+  const auto fail = [&](const std::string& message) {
+    nurbs_host::fail_one(lmp, std::string("Atom ") + values[0] + " in the Atoms section: " + message);
+  };
+  int tag = 0, type = 0, shape_number = 0;
+  double scale = 0, density = 0, q[4];
+  if (!parse(values[0], tag) || tag <= 0) fail("id must be an integer > 0");
+  if (!parse(values[1], type) || type < 1 || type > atom->ntypes)
+    fail(std::string("type ") + values[1] + " must be 1 to " + std::to_string(atom->ntypes));
+  if (!parse(values[2], shape_number) || shape_number < 1 || shape_number > shapes_.count())
+    fail(std::string("shape ") + values[2] + " must be 1 to " + std::to_string(shapes_.count()) +
+         ", the number of shapes of atom_style nurbs");
+  if (!parse(values[3], scale) || scale <= 0) fail(std::string("scale ") + values[3] + " must be > 0");
+  if (!parse(values[4], density) || density <= 0) fail(std::string("density ") + values[4] + " must be > 0");
+  double ignored = 0;
+  for (int k = 5; k < 8; ++k)  // the host reads these itself, and takes anything
+    if (!parse(values[k], ignored)) fail(std::string("coordinate ") + values[k] + " must be a number");
+  for (int k = 0; k < 4; ++k)
+    if (!parse(values[8 + k], q[k]))
+      fail(std::string("quaternion component ") + values[8 + k] + " must be a number");
+  if (!(to_quat(q).norm() > 0)) fail("quaternion 0 0 0 0 must have a length > 0");
+
+  const int i = append_atom(type, coord, image);
+  tag_[i] = tag;
+  set_body(i, shape_number, scale, density, to_quat(q));
+}
+
+// values: vx vy vz wx wy wz
+void AtomVecNurbs::data_vel(int i, char** values) {
+  for (int k = 0; k < 6; ++k) {
+    double& target = k < 3 ? v_[i][k] : omega_[i][k - 3];
+    if (!parse(values[k], target))
+      nurbs_host::fail_one(lmp, "Atom " + std::to_string(tag_[i]) +
+                                    " in the Velocities section: " + values[k] + " must be a number");
+  }
+}
+
+void AtomVecNurbs::pack_data(double** buf, int tag_offset) {
+  for (int i = 0; i < atom->nlocal; ++i) {
+    double* p = buf[i];
+    *p++ = ubuf(tag_[i] + tag_offset).d;
+    *p++ = ubuf(type_[i]).d;
+    *p++ = ubuf(shapetype_[i]).d;
+    *p++ = scale_[i];
+    *p++ = density_[i];
+    p = put_orientation(i, put_position(i, {}, p));
+    *p++ = ubuf((image_[i] & IMGMASK) - IMGMAX).d;
+    *p++ = ubuf((image_[i] >> IMGBITS & IMGMASK) - IMGMAX).d;
+    *p++ = ubuf((image_[i] >> IMG2BITS) - IMGMAX).d;
+  }
+}
+
+void AtomVecNurbs::write_data(FILE* file, int n, double** buf) {
+  const auto integer = [](double word) { return static_cast<int>(ubuf(word).i); };
+  for (int i = 0; i < n; ++i) {
+    const double* p = buf[i];
+    std::fprintf(file, "%d %d %d", integer(p[0]), integer(p[1]), integer(p[2]));
+    for (int k = 3; k < 12; ++k) std::fprintf(file, " %.17g", p[k]);
+    std::fprintf(file, " %d %d %d\n", integer(p[12]), integer(p[13]), integer(p[14]));
+  }
+}
+
+void AtomVecNurbs::pack_vel(double** buf, int tag_offset) {
+  for (int i = 0; i < atom->nlocal; ++i) {
+    buf[i][0] = ubuf(tag_[i] + tag_offset).d;
+    put_velocity(i, {}, buf[i] + 1);
+  }
+}
+
+void AtomVecNurbs::write_vel(FILE* file, int n, double** buf) {
+  for (int i = 0; i < n; ++i) {
+    std::fprintf(file, "%d", static_cast<int>(ubuf(buf[i][0]).i));
+    for (int k = 1; k < 7; ++k) std::fprintf(file, " %.17g", buf[i][k]);
+    std::fprintf(file, "\n");
+  }
+}
+
+bigint AtomVecNurbs::memory_usage() {
+  bigint bytes = 0;
+  const auto count = [&](const char* name, auto... array) {
+    if (atom->memcheck(name)) bytes += memory->usage(array...);
+  };
+  count("tag", tag_, nmax);
+  count("type", type_, nmax);
+  count("mask", mask_, nmax);
+  count("image", image_, nmax);
+  count("x", x_, nmax, 3);
+  count("v", v_, nmax, 3);
+  count("f", f_, nmax * comm->nthreads, 3);
+  count("radius", radius_, nmax);
+  count("density", density_, nmax);
+  count("rmass", rmass_, nmax);
+  count("omega", omega_, nmax, 3);
+  count("angmom", angmom_, nmax, 3);
+  count("torque", torque_, nmax * comm->nthreads, 3);
+  count("quaternion", quaternion_, nmax, 4);
+  count("shapetype", shapetype_, nmax);
+  count("scale", scale_, nmax);
+  return bytes;
+}
+
+}  // namespace LAMMPS_NS

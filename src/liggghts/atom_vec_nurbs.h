@@ -1,0 +1,134 @@
+// atom_style nurbs: particles bounded by NURBS patches. Holds the shapes and the per-particle data: shape
+// number, scale, density and quaternion beside the host's position, velocity and omega; carries them across
+// ranks, restarts and data files.
+#ifdef ATOM_CLASS
+
+AtomStyle(nurbs,AtomVecNurbs)
+
+#else
+
+#ifndef LMP_ATOM_VEC_NURBS_H
+#define LMP_ATOM_VEC_NURBS_H
+
+#include <string>
+
+#include "atom_vec.h"
+#include "contact/contact.h"
+#include "liggghts/shape_library.h"
+#include "motion/rotation.h"
+
+namespace LAMMPS_NS {
+
+class AtomVecNurbs : public AtomVec {
+ public:
+  // The atom style of `lmp`; ends the run with "USER requires atom_style nurbs" when it is another.
+  // Collective.
+  static AtomVecNurbs* require(LAMMPS* lmp, const std::string& user);
+
+  explicit AtomVecNurbs(LAMMPS* lmp);
+  ~AtomVecNurbs() override;
+
+  const ShapeLibrary& shapes() const { return shapes_; }
+
+  // Of owned or ghost particle i: its shape, the factor on the shape's lengths, its placed body, and the
+  // principal moments of inertia (about the shape's principal_axes).
+  const nurbs::Shape* shape(int i) const { return shapes_.shape(shapetype_[i]); }
+  double scale(int i) const { return scale_[i]; }
+  nurbs::Particle particle(int i) const;
+  nurbs::Vec3 principal_inertia(int i) const;
+
+  // Angular momentum of owned particle i about its centre of mass, lab axes. Between steps `omega` is what
+  // counts, so that any command may set it; the momentum it was last made from is kept beside it and used as
+  // long as omega is still the one made from it, so that a free particle keeps its momentum to the last bit.
+  nurbs::Vec3 angular_momentum(int i) const;
+  void set_angular_momentum(int i, const nurbs::Vec3& momentum);
+
+  // Turns owned particle i for a time dt at constant angular momentum.
+  void rotate(int i, nurbs::RotationScheme scheme, const nurbs::Vec3& momentum, double dt);
+
+  // Makes particle i a body of this shape, scale, density and orientation (normalised), and sets what follows
+  // from them: mass and bounding radius. The values must be valid.
+  void set_body(int i, int shape_number, double scale, double density, const nurbs::Quat& orientation);
+
+  void settings(int narg, char** arg) override;
+  void init() override;
+
+  void grow(int n) override;
+  void grow_reset() override;
+  void copy(int from, int to, int delflag) override;
+
+  int pack_comm(int n, int* list, double* buf, int pbc_flag, int* pbc) override;
+  int pack_comm_vel(int n, int* list, double* buf, int pbc_flag, int* pbc) override;
+  void unpack_comm(int n, int first, double* buf) override;
+  void unpack_comm_vel(int n, int first, double* buf) override;
+  int pack_reverse(int n, int first, double* buf) override;
+  void unpack_reverse(int n, int* list, double* buf) override;
+  int pack_border(int n, int* list, double* buf, int pbc_flag, int* pbc) override;
+  int pack_border_vel(int n, int* list, double* buf, int pbc_flag, int* pbc) override;
+  void unpack_border(int n, int first, double* buf) override;
+  void unpack_border_vel(int n, int first, double* buf) override;
+  int pack_exchange(int i, double* buf) override;
+  int unpack_exchange(double* buf) override;
+
+  int size_restart() override;
+  int pack_restart(int i, double* buf) override;
+  int unpack_restart(double* buf) override;
+  void write_restart_settings(FILE* file) override { shapes_.write_restart(file); }
+  void read_restart_settings(FILE* file) override { shapes_.read_restart(file); }
+
+  void create_atom(int type, double* coord) override;
+  void data_atom(double* coord, tagint image, char** values) override;
+  void data_vel(int i, char** values) override;
+  void pack_data(double** buf) override { pack_data(buf, 0); }
+  void pack_data(double** buf, int tag_offset) override;
+  void write_data(FILE* file, int n, double** buf) override;
+  void pack_vel(double** buf) override { pack_vel(buf, 0); }
+  void pack_vel(double** buf, int tag_offset) override;
+  void write_vel(FILE* file, int n, double** buf) override;
+
+  bigint memory_usage() override;
+
+ private:
+  // What a periodic image adds to a ghost's position and (under fix deform) velocity.
+  struct ImageShift {
+    nurbs::Vec3 x = nurbs::Vec3::Zero();
+    nurbs::Vec3 v = nurbs::Vec3::Zero();
+  };
+  enum class Stage { comm, border };
+  ImageShift image_shift(int pbc_flag, const int* pbc, Stage stage) const;
+
+  void put_quaternion(int i, const nurbs::Quat& q);
+  double* put_position(int i, const ImageShift& shift, double* p) const;
+  double* put_orientation(int i, double* p) const;
+  double* put_velocity(int i, const ImageShift& shift, double* p) const;
+  double* put_body(int i, double* p) const;
+  double* put_state(int i, double* p) const;
+  double* put_border(int n, const int* list, const ImageShift& shift, bool velocity, double* p) const;
+  double* get_position(int i, double* p);
+  double* get_orientation(int i, double* p);
+  double* get_velocity(int i, double* p);
+  double* get_body(int i, double* p);
+  double* get_state(int i, double* p);
+  double* get_border(int n, int first, bool velocity, double* p);
+
+  int append_atom(int type, const double* coord, tagint image);
+  void refuse_insertion();
+  void follow_set_command(int i);
+  void update_size(int i);
+  std::string check_all_owned() const;
+
+  ShapeLibrary shapes_;
+
+  // The host's arrays (owned by Atom), and the one array Atom has no place for.
+  int *tag_ = nullptr, *type_ = nullptr, *mask_ = nullptr, *shapetype_ = nullptr;
+  tagint* image_ = nullptr;
+  double **x_ = nullptr, **v_ = nullptr, **f_ = nullptr, **omega_ = nullptr, **angmom_ = nullptr,
+         **torque_ = nullptr, **quaternion_ = nullptr;
+  double *radius_ = nullptr, *density_ = nullptr, *rmass_ = nullptr;
+  double* scale_ = nullptr;
+};
+
+}  // namespace LAMMPS_NS
+
+#endif
+#endif

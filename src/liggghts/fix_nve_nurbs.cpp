@@ -1,0 +1,82 @@
+// fix nve/nurbs. See fix_nve_nurbs.h.
+//
+// A step is: half kick of v and of the angular momentum L, drift of x and of the orientation at constant L,
+// half kick.
+#include "liggghts/fix_nve_nurbs.h"
+
+#include <cmath>
+#include <cstring>
+#include <string>
+
+#include "atom.h"
+#include "liggghts/atom_vec_nurbs.h"
+#include "liggghts/host_error.h"
+
+namespace LAMMPS_NS {
+
+using nurbs::RotationScheme;
+using nurbs::Vec3;
+
+namespace {
+
+RotationScheme parse_scheme(LAMMPS* lmp, const std::string& name) {
+  if (name == "symplectic") return RotationScheme::symplectic;
+  if (name == "richardson") return RotationScheme::richardson;
+  if (name == "exact") return RotationScheme::exact;
+  nurbs_host::fail_all(FLERR, lmp,
+                       "Fix nve/nurbs rotation " + name + " must be symplectic, richardson or exact");
+}
+
+using Vec3Map = Eigen::Map<Vec3>;
+
+}  // namespace
+
+FixNVENurbs::FixNVENurbs(LAMMPS* lmp, int narg, char** arg) : FixNVE(lmp, narg, arg) {
+  time_integrate = 1;
+  AtomVecNurbs::require(lmp, "Fix nve/nurbs");
+  for (int i = 3; i < narg; i += 2) {
+    const std::string keyword = arg[i];
+    if (keyword != "rotation")
+      nurbs_host::fail_all(FLERR, lmp, "Fix nve/nurbs: unknown keyword " + keyword + "; allowed is rotation");
+    if (i + 1 == narg)
+      nurbs_host::fail_all(FLERR, lmp, "Fix nve/nurbs rotation needs one of symplectic, richardson, exact");
+    scheme_ = parse_scheme(lmp, arg[i + 1]);
+  }
+}
+
+void FixNVENurbs::init() {
+  FixNVE::init();
+  AtomVecNurbs::require(lmp, "Fix nve/nurbs");
+}
+
+int FixNVENurbs::group_count() const {
+  return igroup == atom->firstgroup ? atom->nfirst : atom->nlocal;
+}
+
+// Half a step of force on particle i's velocity.
+void FixNVENurbs::kick(int i) const {
+  Vec3Map(atom->v[i]) += dtf / atom->rmass[i] * Vec3Map(atom->f[i]);
+}
+
+void FixNVENurbs::initial_integrate(int) {
+  auto& bodies = static_cast<AtomVecNurbs&>(*atom->avec);
+  const int n = group_count();
+  for (int i = 0; i < n; ++i) {
+    if (!(atom->mask[i] & groupbit)) continue;
+    kick(i);
+    Vec3Map(atom->x[i]) += dtv * Vec3Map(atom->v[i]);
+    bodies.rotate(i, scheme_, bodies.angular_momentum(i) + dtf * Vec3Map(atom->torque[i]), dtv);
+  }
+}
+
+void FixNVENurbs::final_integrate() {
+  auto& bodies = static_cast<AtomVecNurbs&>(*atom->avec);
+  const int n = group_count();
+  for (int i = 0; i < n; ++i) {
+    if (!(atom->mask[i] & groupbit)) continue;
+    kick(i);
+    bodies.set_angular_momentum(i, bodies.angular_momentum(i) + dtf * Vec3Map(atom->torque[i]));
+  }
+}
+
+}  // namespace LAMMPS_NS

@@ -1,0 +1,152 @@
+// The shapes of a simulation: read, shared between ranks, written to restart files. See shape_library.h.
+#include "liggghts/shape_library.h"
+
+#include <mpi.h>
+
+#include <cstdint>
+#include <cstdio>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+
+#include "comm.h"
+#include "io/shape_file.h"
+#include "liggghts/host_error.h"
+
+namespace LAMMPS_NS {
+
+namespace {
+
+// Appends / takes a length-prefixed string; `take` returns false at the end of a damaged `data`.
+void append(std::string& data, const std::string& item) {
+  const std::uint64_t size = item.size();
+  data.append(reinterpret_cast<const char*>(&size), sizeof size);
+  data.append(item);
+}
+
+bool take(const std::string& data, std::size_t& at, std::string& item) {
+  std::uint64_t size = 0;
+  if (data.size() - at < sizeof size) return false;
+  data.copy(reinterpret_cast<char*>(&size), sizeof size, at);
+  at += sizeof size;
+  if (data.size() - at < size) return false;
+  item = data.substr(at, size);
+  at += size;
+  return true;
+}
+
+// Gives rank 0's string to all ranks.
+void broadcast(std::string& data, MPI_Comm world) {
+  std::uint64_t size = data.size();
+  MPI_Bcast(&size, 1, MPI_UINT64_T, 0, world);
+  data.resize(size);
+  MPI_Bcast(data.data(), static_cast<int>(size), MPI_CHAR, 0, world);
+}
+
+// The whole content of a file; false when it can't be read.
+bool slurp(const std::string& file, std::string& text) {
+  std::error_code ignored;
+  if (std::filesystem::is_directory(file, ignored)) return false;
+  std::ifstream in(file, std::ios::binary);
+  if (!in) return false;
+  text.assign(std::istreambuf_iterator<char>(in), std::istreambuf_iterator<char>());
+  return !in.bad();
+}
+
+}  // namespace
+
+// Fills sources_ (rank 0); returns an error message or nothing.
+std::string ShapeLibrary::read_sources(const std::vector<std::string>& files) {
+  for (const std::string& file : files) {
+    Source source{std::filesystem::path(file).stem().string(), file, ""};
+    if (!slurp(file, source.text)) return "Cannot read shape file " + file;
+    sources_.push_back(std::move(source));
+  }
+  return "";
+}
+
+void ShapeLibrary::share_sources() {
+  std::string data;
+  for (const Source& source : sources_)
+    for (const std::string& item : {source.name, source.file, source.text}) append(data, item);
+  broadcast(data, world);
+  sources_.clear();
+  Source source;
+  for (std::size_t at = 0;
+       take(data, at, source.name) && take(data, at, source.file) && take(data, at, source.text);)
+    sources_.push_back(source);
+}
+
+void ShapeLibrary::build() {
+  shapes_.clear();
+  for (const Source& source : sources_) {
+    if (number_of(source.name) != 0)
+      nurbs_host::warn(FLERR, lmp,
+                       "Two shapes are named " + source.name + "; that name means the first of them");
+    std::vector<std::string> warnings;
+    try {
+      auto content = nurbs::parse_shape(source.text, source.file);
+      shapes_.push_back(
+          nurbs::make_shape(source.name, std::move(content.surfaces), content.gyration, &warnings));
+    } catch (const nurbs::ShapeError& error) {
+      const std::string what = error.what();
+      const bool names_file = what.find(source.file) != std::string::npos;
+      nurbs_host::fail_all(FLERR, lmp, names_file ? what : "Shape file " + source.file + ": " + what);
+    }
+    for (const std::string& warning : warnings)
+      nurbs_host::warn(FLERR, lmp, "Shape file " + source.file + ": " + warning);
+  }
+}
+
+void ShapeLibrary::read_files(const std::vector<std::string>& files) {
+  sources_.clear();
+  std::string failure;
+  if (comm->me == 0) failure = read_sources(files);
+  broadcast(failure, world);
+  if (!failure.empty()) nurbs_host::fail_all(FLERR, lmp, failure);
+  share_sources();
+  build();
+}
+
+void ShapeLibrary::write_restart(FILE* file) const {
+  std::string data;
+  for (const Source& source : sources_)
+    for (const std::string& item : {source.name, source.file, source.text}) append(data, item);
+  const std::uint64_t size = data.size();
+  std::fwrite(&size, sizeof size, 1, file);
+  std::fwrite(data.data(), 1, data.size(), file);
+}
+
+void ShapeLibrary::read_restart(FILE* file) {
+  sources_.clear();
+  std::string failure;
+  if (comm->me == 0) {
+    std::uint64_t size = 0;
+    std::string data;
+    bool complete = std::fread(&size, sizeof size, 1, file) == 1;
+    for (char block[4096]; complete && data.size() < size;) {
+      const std::size_t wanted = std::min<std::uint64_t>(sizeof block, size - data.size());
+      complete = std::fread(block, 1, wanted, file) == wanted;
+      data.append(block, wanted);
+    }
+    Source source;
+    std::size_t at = 0;
+    while (complete && at < data.size()) {
+      complete = take(data, at, source.name) && take(data, at, source.file) && take(data, at, source.text);
+      if (complete) sources_.push_back(source);
+    }
+    if (!complete || sources_.empty()) failure = "The shapes in the restart file are incomplete";
+  }
+  broadcast(failure, world);
+  if (!failure.empty()) nurbs_host::fail_all(FLERR, lmp, failure);
+  share_sources();
+  build();
+}
+
+int ShapeLibrary::number_of(const std::string& name) const {
+  for (int i = 0; i < count(); ++i)
+    if (shapes_[i]->name == name) return i + 1;
+  return 0;
+}
+
+}  // namespace LAMMPS_NS

@@ -1,0 +1,51 @@
+// The shapes of a simulation, as `atom_style nurbs` names them: shape number 1..count() in the order of the
+// files. Every rank holds all of them, and the text of their files, so that a restart file carries them.
+#pragma once
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "body/shape.h"
+#include "lmptype.h"
+#include "pointers.h"
+
+namespace LAMMPS_NS {
+
+class ShapeLibrary : protected Pointers {
+ public:
+  explicit ShapeLibrary(LAMMPS* lmp) : Pointers(lmp) {}
+
+  // Rank 0 reads the files; all ranks build the shapes. Collective. A file that can't be read or is not a
+  // shape ends the run with one line naming it; repairs are warnings.
+  void read_files(const std::vector<std::string>& files);
+
+  // Writes all shapes to a restart file / reads them back. Writing: rank 0 only; reading: collective, `file`
+  // open on rank 0 only.
+  void write_restart(FILE* file) const;
+  void read_restart(FILE* file);
+
+  int count() const { return static_cast<int>(shapes_.size()); }
+
+  // The shape of this number, 1..count(); not checked.
+  const nurbs::Shape* shape(int number) const { return shapes_[number - 1].get(); }
+
+  // The number of the first shape of this name, or 0 when there is none.
+  int number_of(const std::string& name) const;
+
+ private:
+  struct Source {
+    std::string name;  // of the shape: the file's stem
+    std::string file;  // as the user gave it, to word errors
+    std::string text;  // the file's content
+  };
+
+  std::string read_sources(const std::vector<std::string>& files);
+  void share_sources();
+  void build();
+
+  std::vector<Source> sources_;
+  std::vector<std::shared_ptr<const nurbs::Shape>> shapes_;
+};
+
+}  // namespace LAMMPS_NS
