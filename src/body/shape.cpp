@@ -220,6 +220,21 @@ void set_gyration(Shape& s, const std::optional<Mat3>& given) {
   s.principal_axes = frame.axes;
 }
 
+// FNV-1a (Fowler, Noll & Vo) over the bytes of the surfaces.
+std::uint64_t content_stamp(const Shape& s) {
+  std::uint64_t hash = 0xcbf29ce484222325ull;
+  const auto add = [&hash](const void* data, size_t bytes) {
+    for (size_t k = 0; k < bytes; ++k)
+      hash = (hash ^ static_cast<const unsigned char*>(data)[k]) * 0x100000001b3ull;
+  };
+  for (const NurbsSurface& surface : s.surfaces) {
+    add(surface.knots_u.data(), surface.knots_u.size() * sizeof(double));
+    add(surface.knots_v.data(), surface.knots_v.size() * sizeof(double));
+    add(surface.points.data(), surface.points.size() * sizeof surface.points[0]);
+  }
+  return hash;
+}
+
 void build(Draft& draft, const std::optional<Mat3>& gyration) {
   check_surfaces(draft.shape.surfaces);
   split(draft);
@@ -229,6 +244,7 @@ void build(Draft& draft, const std::optional<Mat3>& gyration) {
   set_gyration(draft.shape, gyration);
   measure(draft);
   build_atlas(draft.shape, kAtlasCells);
+  draft.shape.stamp = content_stamp(draft.shape);
 }
 
 }  // namespace

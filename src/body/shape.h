@@ -4,6 +4,7 @@
 #pragma once
 
 #include <array>
+#include <cstdint>
 #include <memory>
 #include <optional>
 #include <stdexcept>
@@ -48,6 +49,7 @@ struct CurvatureBounds {
 
 struct Shape {
   std::string name;
+  std::uint64_t stamp = 0;  // of the surfaces' contents: the same on every rank and across restarts
   std::vector<NurbsSurface> surfaces;  // as read, turned outward (Su x Sv points out), frame of the file
   std::vector<BezierPatch> patches;    // exact Bezier split, moved so that the centre of mass is the origin
   std::vector<int> surface_of_patch;   // index into surfaces

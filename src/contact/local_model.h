@@ -8,72 +8,128 @@
 // h(t) = d.a + integral of sin(t - s) rho(s) ds; rho = rho(0) gives the middle term (rho(0) (1 - cos t), a
 // sphere exactly; the plain quadratic form would leave rho t^4 / 8 whatever L), and |rho(s) - rho(0)| <= L s
 // the remainder. L is a bound of |dW/dn| (Shape::curvature_rate), as long as the support point stays on the
-// same Bezier patch: |W| |d - n| must be less than the distance to the patch's edges. a, n and W turn with
-// their body, exactly. Minimising p(d) = h_A(d) + h_B(-d) - d . offset of the two quadratics over unit d is
-// one 2 x 2 system; p at its solution d is wrong by what h is, and above its minimum by what is left of the
-// gradient:
+// same Bezier patch: |W| |d - n| must be less than the distance to the patch's edges. a, n and W are kept in
+// the body's own axes and turn with it, exactly. Minimising p(d) = h_A(d) + h_B(-d) - d . offset of the two
+// quadratics over unit d is one 2 x 2 system; p at its solution d is wrong by what h is, and above its
+// minimum by what is left of the gradient:
 //     |error of the gap| <= (L_A t_A^3 + L_B t_B^3) / 6 + |grad p|^2 / (2 least eigenvalue of Hess p).
 #pragma once
 
-#include <cmath>
-
 #include "contact/pair_frame.h"
+#include "nurbs/jet_lanes.h"
 #include "nurbs/tolerances.h"
+#include "nurbs/wide.h"
 
 namespace nurbs {
 
-// One body's half of the model, in lab axes at the reference pose, lengths of the lab. Plain doubles.
-struct SupportModel {
-  double arm[3];      // a, from the centre of mass
-  double normal[3];   // n
-  double tangent[3];  // unit t, square to n; with s = n x t ...
-  double w[3];        // ... W = w0 t t' + w1 (t s' + s t') + w2 s s'
-  double rate;        // L
-  double room;        // distance to the patch's edges, less a margin
+// One body's half of the model: axes of its shape, origin at its centre of mass, lengths of the lab.
+template <class Real>
+struct SupportModelOf {
+  Triple<Real> arm;      // a
+  Triple<Real> normal;   // n, outward
+  Triple<Real> tangent;  // unit t, square to n; with s = n x t ...
+  Real w0, w1, w2;       // ... W = w0 t t' + w1 (t s' + s t') + w2 s s'
+  Real rate;             // L
+  Real room;             // distance to the patch's edges, less a margin
 };
+using SupportModel = SupportModelOf<double>;
 
+// Both halves, and the overlap below which the contact is the only one: negative infinity for no model.
 struct LocalModel {
   SupportModel a, b;
+  double unique;
 };
+constexpr int kLocalModelSize = 29;  // doubles
+static_assert(sizeof(LocalModel) == kLocalModelSize * sizeof(double));
 
-struct LocalContact {
-  Vec3 normal;            // unit d, lab
-  Vec3 point_a, point_b;  // from A's centre of mass, lab
-  double gap, error;      // |true gap - gap| <= error
-  double drift;           // about how far the points may be from the true ones: L t^2 / 2
-  bool valid;             // false: outside what the model covers
+template <class Real>
+struct LocalContactOf {
+  Triple<Real> normal;            // unit d, lab, from A towards B
+  Triple<Real> point_a, point_b;  // from A's centre of mass, lab
+  Real gap, error;                // |true gap - gap| <= error
+  Real drift;                     // about how far the points may be from the true ones: L t^2 / 2
+  Real tilt2;        // square of the angle, rad, that the normal may be off by what one step left
+  Mask<Real> valid;  // false: outside what the model covers
 };
+using LocalContact = LocalContactOf<double>;
 
-// Fills a body's half from the jet at its contact point `at`, given in axes that `axes` turns into the lab,
-// lengths of the lab; `center` is the body's centre of mass there, `rate` its L. False where W is not finite
-// and positive: the model then can't serve.
+// Fills a body's half from the jet at its contact point `at`, given in axes that `axes` turns into the body's
+// own, lengths of the lab; `center` is the body's centre of mass there, `rate` its L. False where W is not
+// finite and positive: the model then can't serve.
 bool make_support_model(const Mat3& axes, const Vec3& center, const SurfacePoint& at, const JetLanes& jet,
                         double rate, SupportModel* model);
 
+// The half of a plane that does not turn, or of a point of it: `normal` in its own axes.
+SupportModel plane_model(const Vec3& normal);
+
 // Bound on the third-order remainder of one body's half, a length, for a turn of the root of `angle2`.
-inline double cubic_remainder(double rate, double angle2) {
-  return kRemainderSafety / 6 * rate * angle2 * std::sqrt(angle2);
+template <class Real>
+NURBS_INLINE Real cubic_remainder(const Real& rate, const Real& angle2) {
+  return kRemainderSafety / 6 * rate * angle2 * root(angle2);
 }
 
 // Keeps the model from turns that may reach another support point: to `turn` (rad) at most. On bodies whose
 // normal map says where those are; others have none.
 void limit_turn(const Shape& shape, double scale, double turn, SupportModel* model);
 
-// One body, turned from q0 to q, against a fixed plane, whose direction d (unit, from the body into the
-// plane) does not change.
-struct LocalSupport {
-  double h;      // d . point
-  double error;  // |true h - h| <= error
-  double drift;  // about how far the point may be from the true one
-  Vec3 point;    // from the body's centre of mass, lab
-  bool valid;
-};
-LocalSupport evaluate_local_support(const SupportModel& model, const Quat& q, const double* q0,
-                                    const Vec3& d);
+// The contact now: `turn_a`, `turn_b` turn the bodies' axes into the lab's, B's centre is at `offset` from
+// A's. `free` is 1, or 0 where the direction is A's normal whatever B does (A a plane). No surface
+// evaluation; 50 ns one at a time, 10 ns side by side.
+template <class Real>
+NURBS_INLINE LocalContactOf<Real> evaluate_local(const SupportModelOf<Real>& ma,
+                                                 const SupportModelOf<Real>& mb, const Turn<Real>& turn_a,
+                                                 const Turn<Real>& turn_b, const Triple<Real>& offset,
+                                                 const Real& free) {
+  using V = Triple<Real>;
+  const V arm_a = turn_a * ma.arm, na = turn_a * ma.normal, ta = turn_a * ma.tangent, sa = cross(na, ta);
+  const V arm_b = turn_b * mb.arm, out_b = turn_b * mb.normal, tb = turn_b * mb.tangent,
+          sb = cross(out_b, tb);
 
-// The contact now: bodies turned from the reference orientations q0 (w x y z) to q, B's centre at `offset`
-// from A's. No surface evaluation; ~50 ns.
-LocalContact evaluate_local(const LocalModel& model, const Quat& q_a, const double* q0_a, const Quat& q_b,
-                            const double* q0_b, const Vec3& offset);
+  // One Newton step on p from d = n_A: (W_A + W_B - p) tau = -(g + W_B (n_A + n_B)) in the basis (t_A, s_A).
+  const V g = arm_a - arm_b - offset, apart = na + out_b;
+  const Real p = dot(na, g), a1 = dot(tb, apart), b1 = dot(sb, apart);
+  const Real tt = dot(tb, ta), ts = dot(tb, sa), st = dot(sb, ta), ss = dot(sb, sa);
+  const Real mt = mb.w0 * a1 + mb.w1 * b1, ms = mb.w1 * a1 + mb.w2 * b1;
+  const Real r1 = free * (dot(ta, g) + tt * mt + st * ms), r2 = free * (dot(sa, g) + ts * mt + ss * ms);
+  const Real m11 = ma.w0 - p + tt * (mb.w0 * tt + mb.w1 * st) + st * (mb.w1 * tt + mb.w2 * st);
+  const Real m12 = ma.w1 + tt * (mb.w0 * ts + mb.w1 * ss) + st * (mb.w1 * ts + mb.w2 * ss);
+  const Real m22 = ma.w2 - p + ts * (mb.w0 * ts + mb.w1 * ss) + ss * (mb.w1 * ts + mb.w2 * ss);
+  const Real det = m11 * m22 - m12 * m12;
+  const Mask<Real> minimum = ((det > 0.0) & (m11 > 0.0)) | (free == 0.0);
+  const Real r = 1.0 / select(minimum & (det != 0.0), det, all<Real>(1));
+  const Real x = r * (m12 * r2 - m22 * r1), y = r * (m12 * r1 - m11 * r2);
+  LocalContactOf<Real> c;
+  c.normal = (1.0 / root(1.0 + x * x + y * y)) * (na + x * ta + y * sa);
+
+  // Both support points there, p from them, and the remainder.
+  const V& d = c.normal;
+  const V turn_of_a = d - na, turn_of_b = V{} - d - out_b;
+  const auto support = [&d](const SupportModelOf<Real>& m, const V& t, const V& s, const V& n,
+                            const V& turned, const Real& towards, Real* stray2) {
+    const Real a = dot(t, turned), b = dot(s, turned);
+    const Real along_t = m.w0 * a + m.w1 * b, along_s = m.w1 * a + m.w2 * b;
+    *stray2 = along_t * along_t + along_s * along_s;
+    const V moved = along_t * t + along_s * s;
+    return moved - (towards * dot(d, moved) / (1.0 + towards * dot(d, n))) * n;
+  };
+  Real stray2_a, stray2_b;
+  c.point_a = arm_a + support(ma, ta, sa, na, turn_of_a, all<Real>(1), &stray2_a);
+  c.point_b = offset + arm_b + support(mb, tb, sb, out_b, turn_of_b, all<Real>(-1), &stray2_b);
+  const V between = c.point_b - c.point_a;
+  c.gap = dot(d, between);
+  const Real angle2_a = dot(turn_of_a, turn_of_a), angle2_b = dot(turn_of_b, turn_of_b);
+  const Real second_a = ma.rate * angle2_a, second_b = mb.rate * angle2_b;
+  const Real third = second_a * root(angle2_a) + second_b * root(angle2_b);
+  // How far p's gradient may be from zero here: what one linear step left of it, and the maps' own remainder.
+  // (x + y)^2 <= 2 x^2 + 2 y^2; det / trace is at most the least eigenvalue of p's Hessian.
+  const V across = between - c.gap * d;
+  const Real left2 = free * dot(across, across), own = free * 0.5 * (second_a + second_b);
+  const Real soft = (m11 + m22) * r;
+  c.error = kRemainderSafety * (third * (1.0 / 6) + (left2 + own * own) * soft);
+  c.drift = 0.5 * larger(second_a, second_b);
+  c.tilt2 = left2 * soft * soft;
+  c.valid = minimum & (stray2_a <= ma.room * ma.room) & (stray2_b <= mb.room * mb.room);
+  return c;
+}
 
 }  // namespace nurbs

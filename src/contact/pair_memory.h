@@ -1,5 +1,5 @@
-// What a pair remembers between steps, and the one place that says how. Plain doubles, so that it lives in
-// the host's contact history: it migrates, survives reneighbouring and restarts with the pair.
+// What a pair that touches, or is close to it, remembers between steps, as plain doubles: the proof that
+// every neighbour keeps, the points of the last solve, and the local model made from it.
 #pragma once
 
 #include <cmath>
@@ -8,52 +8,43 @@
 
 #include "contact/local_model.h"
 #include "contact/pair_search.h"
+#include "contact/proof.h"
 
 namespace nurbs {
 
 // A surface point.
 struct PointMemory {
-  double patch, u, v;
-  double step[2];  // how far it went from the solve before, in (u, v); 0 across patches
+  double patch, u, v;  // patch < 0: none
+  double step[2];      // how far it went from the solve before, in (u, v); 0 across patches
 };
 
+// Empty when proof.stamp is 0; then nothing else means anything. proof.contact: whether the last solve could
+// not prove the pair further apart than `reach`.
 struct PairMemory {
-  double known;  // 0 empty; 1 the reference pose and `lower` are set; 2 the surface points too; 3 the local
-                 // model too
-  // Reference pose: where the bodies were when `lower` was proven.
-  double offset[3];  // x_B - x_A, lab
-  double q_a[4];     // orientations, w x y z
-  double q_b[4];
-  double direction[3];     // unit d, lab, along which ...
-  double lower;            // ... the gap was proven at least this large
+  PairProof proof;
   PointMemory on_a, on_b;  // of the last solve, the warm start
-  // Local quadratic model at the reference pose, and the overlap below which its contact is the only one.
-  LocalModel model;
-  double unique;
-  double spare;
-
-  // Whether the last solve could not prove the pair further apart than `reach`.
-  bool touched(double reach) const { return known >= 2 && lower <= reach; }
+  LocalModel model;        // of the last solve
 };
 static_assert(sizeof(PairMemory) == kPairMemorySize * sizeof(double),
-              "the host allots kPairMemorySize doubles");
+              "callers allot kPairMemorySize doubles");
 
-// The host's doubles seen as a pair's memory, in place: copying them would cost more than the cheapest rung.
+// A caller's doubles seen as a pair's memory, in place: copying them would cost more than the cheapest rung.
 inline PairMemory& memory_at(double* doubles) {
   return *reinterpret_cast<PairMemory*>(doubles);
 }
 
-inline void store(const Vec3& v, double* to) {
-  std::memcpy(to, v.data(), 3 * sizeof(double));
+inline void drop_model(LocalModel* model) {
+  model->unique = -std::numeric_limits<double>::infinity();
 }
-inline Vec3 load(const double* from) {
-  return {from[0], from[1], from[2]};
-}
-inline void store(const Quat& q, double* to) {
-  to[0] = q.w();
-  to[1] = q.x();
-  to[2] = q.y();
-  to[3] = q.z();
+
+// What is remembered of other bodies, other sizes or by another solver is worth nothing: dropped whole.
+inline void adopt(std::uint64_t stamp, PairMemory* m) {
+  if (m->proof.stamp == stamp) return;
+  *m = PairMemory{};
+  m->proof.stamp = stamp;
+  m->on_a.patch = m->on_b.patch = -1;
+  drop_proof(&m->proof);
+  drop_model(&m->model);
 }
 
 // Where a surface point would be had it moved on as it last did; if that leaves the patch, where it was.
@@ -64,21 +55,59 @@ inline SurfacePoint warm_point(const PointMemory& m, const Shape& shape) {
   const bool inside = u >= 0 && u <= 1 && v >= 0 && v <= 1;
   return inside ? SurfacePoint{p, u, v} : SurfacePoint{p, m.u, m.v};
 }
-// `follows`: what is stored is the point of the solve before.
-inline void remember_point(const SurfacePoint& now, bool follows, PointMemory* m) {
-  const bool on = follows && m->patch == now.patch;
+inline void remember_point(const SurfacePoint& now, PointMemory* m) {
+  const bool on = m->patch == now.patch;
   *m = {static_cast<double>(now.patch), now.u, now.v, {on ? now.u - m->u : 0, on ? now.v - m->v : 0}};
 }
 
-// |q - q0| of unit quaternions is 2 sin(angle / 4); a point at distance R from the centre has moved by
-// 2 R sin(angle / 2) <= 2 R |q - q0|. Here (2 |q - q0|)^2.
-inline double turned2(const Quat& q, const double* q0) {
-  const double w = q.w() - q0[0], x = q.x() - q0[1], y = q.y() - q0[2], z = q.z() - q0[3];
-  return 4 * (w * w + x * x + y * y + z * z);
+inline CoarsePoint coarse(const PointMemory& m) {
+  constexpr double kSteps = 65535;
+  if (!(m.patch >= 0 && m.patch < kSteps)) return {65535, 0, 0};
+  return {static_cast<std::uint16_t>(m.patch), static_cast<std::uint16_t>(m.u * kSteps + 0.5),
+          static_cast<std::uint16_t>(m.v * kSteps + 0.5)};
 }
-inline double turned(const Quat& q, const double* q0) {
-  return std::sqrt(turned2(q, q0));
+inline PointMemory fine(const CoarsePoint& c) {
+  constexpr double kSteps = 65535;
+  return {c.patch == 65535 ? -1.0 : c.patch, c.u / kSteps, c.v / kSteps, {0, 0}};
 }
+
+// Whether the local model's answer is good enough: its remainder below half the tolerance, on its patches,
+// and shallow enough to be the only contact.
+template <class Real>
+NURBS_INLINE Mask<Real> serves(const LocalContactOf<Real>& c, const Real& unique, double tolerance,
+                               const Real& size) {
+  const Real allowed = tolerance * size;
+  return c.valid & (-c.gap <= unique) & (c.error <= 0.5 * allowed) & (c.drift <= kLocalDrift * allowed);
+}
+
+inline void set_local(const LocalContact& c, const Vec3& offset, double reach, ContactResult* r) {
+  const double error = c.error + kRoundoff * offset.lpNorm<1>();
+  r->rung = Rung::local_model;
+  r->gap = c.gap;
+  r->lower = c.gap - error;
+  r->upper = c.gap + error;
+  r->normal = vec(c.normal);
+  r->point_a = vec(c.point_a);
+  r->point_b = vec(c.point_b);
+  r->status = r->lower > reach ? Status::separated : Status::converged;
+}
+
+// Names the body for proofs: its shape's contents and its size.
+inline std::uint64_t stamp(const Particle& p) {
+  return body_stamp(p.shape->stamp, p.scale);
+}
+
+// Names a plane by its normal: it is moved as bodies are, but not turned.
+inline std::uint64_t stamp(const Vec3& normal) {
+  return body_stamp(body_stamp(body_stamp(0, normal[0]), normal[1]), normal[2]);
+}
+
+// The rungs that evaluate surfaces (pair_search.h), for memory that the caller keeps: bounds, Newton from the
+// last points, cold start, polytope. find_contact without its first and third rung.
+ContactResult solve_contact(const Particle& a, const Particle& b, const ContactSettings& settings,
+                            PairMemory& memory);
+ContactResult solve_plane_contact(const Particle& particle, double height, const Vec3& normal,
+                                  const ContactSettings& settings, PairMemory& memory);
 
 inline bool finite(const Particle& p) {
   return std::isfinite(p.x.sum() + p.q.coeffs().sum() + p.scale) && p.scale > 0;

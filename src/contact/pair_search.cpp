@@ -19,25 +19,14 @@ bool set_separated(double lower, double reach, Rung rung, ContactResult* r) {
   return true;
 }
 
-// Rung 1, no surface evaluation: the budget of the last proof, then spheres. Let d be the fixed lab direction
-// along which the gap was proven at least `lower` at the reference pose: lower <= d.offset0 - h_A(d) -
-// h_B(-d). Since then the offset has changed by an exactly known vector; no point of K has moved relative to
-// its centre by more than 2 R_K |q_K - q0_K|, so neither has its support. Hence
-//     gap >= lower + d . (offset - offset0) - 2 R_A |q_A - q0_A| - 2 R_B |q_B - q0_B|.
-// Nothing is assumed of how the bodies moved in between.
-NURBS_INLINE bool safe(const Particle& a, const Particle& b, double enough, const PairMemory& m,
+// Rung 1, no surface evaluation: what the last proof is still worth, then spheres.
+NURBS_INLINE bool safe(const Particle& a, const Particle& b, double enough, const PairProof& proof,
                        ContactResult* r) {
   const double ra = a.scale * a.shape->bounding_radius, rb = b.scale * b.shape->bounding_radius;
   const Vec3 offset = b.x - a.x;
-  constexpr double kSafe = 1 - 8 * kRoundoff;
-  if (m.known > 0) {
-    const double straight = m.lower + load(m.direction).dot(offset - load(m.offset));
-    const double a2 = ra * ra * turned2(a.q, m.q_a), b2 = rb * rb * turned2(b.q, m.q_b);
-    double turned = std::sqrt(2 * (a2 + b2));  // x + y <= sqrt(2 x^2 + 2 y^2)
-    if (!(straight - turned > enough)) turned = std::sqrt(a2) + std::sqrt(b2);
-    if (set_separated((straight - turned) * kSafe, enough, Rung::safe, r)) return true;
-  }
+  if (set_separated(proven_gap(proof, offset, a.q, ra, b.q, rb, enough), enough, Rung::safe, r)) return true;
   const double spheres2 = offset.squaredNorm(), reach = ra + rb;
+  constexpr double kSafe = 1 - 8 * kRoundoff;
   return spheres2 > reach * reach &&
          set_separated((std::sqrt(spheres2) - reach) * kSafe, enough, Rung::safe, r);
 }
@@ -50,51 +39,42 @@ class Ladder {
   // The rungs above the first. A pair that touched last time is looked for where it was.
   void climb(ContactResult* r) {
     if (!finite(a_) || !finite(b_)) return;
-    if (memory_.known >= 3 && local(r)) return;
+    if (local(r)) return;
     solve(r);
   }
 
- private:
+  // The rungs that evaluate surfaces.
   __attribute__((noinline)) void solve(ContactResult* r) {
-    const bool touched = memory_.touched(settings_.reach);
+    const bool touched = memory_.proof.contact != 0;
     const PairFrame pair(a_, b_);
     if (!touched && bounds(pair, r)) return;
     const double tolerance = std::max(settings_.tolerance * pair.size, kLeastTolerance * pair.reach);
-    if (memory_.known >= 2 && warm(pair, tolerance, r)) return;
+    if (memory_.on_a.patch >= 0 && warm(pair, tolerance, r)) return;
     if (touched && bounds(pair, r)) return;
     *r = cold(pair, tolerance, r->iterations);
   }
 
+ private:
   // Rung 2: the atlases along the last separating direction, or along the line of centres.
   bool bounds(const PairFrame& pair, ContactResult* r) {
     if (!std::isfinite(settings_.reach)) return false;
-    const Vec3 d = memory_.known > 0 ? Vec3(pair.axes_a.transpose() * load(memory_.direction))
-                                     : pair.offset.normalized();
+    const Vec3 d = has_proof(memory_.proof) ? Vec3(pair.axes_a.transpose() * load(memory_.proof.direction))
+                                            : pair.offset.normalized();
     const double lower = -atlas_overlap(pair, d);
     if (!set_separated(lower, settings_.reach, Rung::bounds, r)) return false;
     remember_pose(pair, d, lower);
     return true;
   }
 
-  // Rung 3: the quadratic model of the last solve, while its remainder is below half the tolerance, the
-  // contact stays on its patches and shallow enough to be the only one. The model is not renewed: nothing
-  // accumulates.
+  // Rung 3: the quadratic model of the last solve. The model is not renewed: nothing accumulates.
   bool local(ContactResult* r) const {
+    if (!(memory_.model.unique > 0)) return false;
     const double size = std::min(a_.scale * a_.shape->bounding_radius, b_.scale * b_.shape->bounding_radius);
-    const double tolerance = settings_.tolerance * size;
     const Vec3 offset = b_.x - a_.x;
-    const LocalContact c = evaluate_local(memory_.model, a_.q, memory_.q_a, b_.q, memory_.q_b, offset);
-    if (!c.valid || -c.gap > memory_.unique) return false;
-    if (!(c.error <= 0.5 * tolerance && c.drift <= kLocalDrift * tolerance)) return false;
-    const double error = c.error + kRoundoff * offset.lpNorm<1>();
-    r->rung = Rung::local_model;
-    r->gap = c.gap;
-    r->lower = c.gap - error;
-    r->upper = c.gap + error;
-    r->normal = c.normal;
-    r->point_a = c.point_a;
-    r->point_b = c.point_b;
-    r->status = r->lower > settings_.reach ? Status::separated : Status::converged;
+    const LocalContact c = evaluate_local(memory_.model.a, memory_.model.b, turn(a_.q.toRotationMatrix()),
+                                          turn(b_.q.toRotationMatrix()), triple(offset), 1.0);
+    if (!serves(c, memory_.model.unique, settings_.tolerance, size)) return false;
+    set_local(c, offset, settings_.reach, r);
     return true;
   }
 
@@ -104,7 +84,7 @@ class Ladder {
                                   tolerance, settings_.reach, kWarmIterations);
     r->iterations = s.iterations;
     if (!s.converged && !confirm(pair, tolerance, s)) return false;
-    const double turned2_a = turned2(a_.q, memory_.q_a), turned2_b = turned2(b_.q, memory_.q_b);
+    const double turned2_a = turned2(a_.q, memory_.proof.q_a), turned2_b = turned2(b_.q, memory_.proof.q_b);
     *r = finish(pair, s, s.normal, Rung::warm, s.iterations);
     if (r->status == Status::converged) remember_model(pair, s, tolerance, turned2_a, turned2_b);
     return true;
@@ -217,19 +197,14 @@ class Ladder {
   }
 
   void remember_pose(const PairFrame& pair, const Vec3& d, double lower) {
-    memory_.known = std::clamp(memory_.known, 1.0, 2.0);  // a model belongs to the old reference
-    store(b_.x - a_.x, memory_.offset);
-    store(a_.q, memory_.q_a);
-    store(b_.q, memory_.q_b);
-    store(Vec3(pair.axes_a * d), memory_.direction);
-    memory_.lower = lower;
+    drop_model(&memory_.model);  // a model belongs to the old reference
+    set_proof(pair.axes_a * d, lower, b_.x - a_.x, a_.q, b_.q, &memory_.proof);
+    memory_.proof.contact = !(lower > settings_.reach);
   }
 
   void remember_points(const PointPair& p) {
-    const bool follows = memory_.known >= 2;
-    memory_.known = 2;  // drops the model
-    remember_point(p.on_a, follows, &memory_.on_a);
-    remember_point(p.on_b, follows, &memory_.on_b);
+    remember_point(p.on_a, &memory_.on_a);
+    remember_point(p.on_b, &memory_.on_b);
   }
 
   // Worth its 50 ns only if bodies that turn as they just did would be served at least once.
@@ -239,12 +214,13 @@ class Ladder {
     const double rate_a = pair.scale_a * pair.a->curvature_rate[s.base_a.patch];
     const double rate_b = pair.scale_b * pair.b->curvature_rate[s.base_b.patch];
     if (!(cubic_remainder(rate_a, turned2_a) + cubic_remainder(rate_b, turned2_b) <= 0.5 * tolerance)) return;
-    if (!make_support_model(pair.axes_a, Vec3::Zero(), s.base_a, s.jet_a, rate_a, &memory_.model.a)) return;
-    if (!make_support_model(pair.axes_a, pair.offset, s.base_b, s.jet_b, rate_b, &memory_.model.b)) return;
+    if (!make_support_model(Mat3::Identity(), Vec3::Zero(), s.base_a, s.jet_a, rate_a, &memory_.model.a))
+      return;
+    if (!make_support_model(pair.turn.transpose(), pair.offset, s.base_b, s.jet_b, rate_b, &memory_.model.b))
+      return;
     limit_turn(*pair.a, pair.scale_a, s.turn, &memory_.model.a);
     limit_turn(*pair.b, pair.scale_b, s.turn, &memory_.model.b);
-    memory_.unique = 0.5 * s.bracket.unique;
-    memory_.known = 3;
+    memory_.model.unique = 0.5 * s.bracket.unique;
   }
 
   const Particle &a_, &b_;
@@ -258,34 +234,22 @@ __attribute__((noinline)) void climb(const Particle& a, const Particle& b, const
   Ladder(a, b, settings, m).climb(r);
 }
 
-__attribute__((noinline)) ContactResult reference_solver(const Particle& a, const Particle& b,
-                                                         const ContactSettings& settings,
-                                                         PairMemory& memory) {
-  if (!finite(a) || !finite(b)) return {};
-  CsoStart start;
-  start.valid = memory.known >= 2;
-  start.direction = load(memory.direction);
-  start.on_a = warm_point(memory.on_a, *a.shape);
-  start.on_b = warm_point(memory.on_b, *b.shape);
-  const ContactResult r = solve_cso(a, b, settings.tolerance, &start);
-  memory.known = start.valid ? 2 : 0;
-  store(start.direction, memory.direction);
-  remember_point(start.on_a, false, &memory.on_a);
-  remember_point(start.on_b, false, &memory.on_b);
-  return r;
-}
-
 }  // namespace
 
 ContactResult find_contact(const Particle& a, const Particle& b, const ContactSettings& settings,
                            double* memory) {
+  if (settings.solver == Solver::cso) return find_contact_cso(a, b, settings, memory);
   PairMemory& m = memory_at(memory);
+  adopt(pair_stamp(stamp(a), stamp(b), settings.solver), &m);
   ContactResult r;
-  if (settings.solver == Solver::cso) {
-    r = reference_solver(a, b, settings, m);
-  } else if (m.touched(settings.reach) || !safe(a, b, settings.reach, m, &r)) {
-    climb(a, b, settings, m, &r);
-  }
+  if (m.proof.contact != 0 || !safe(a, b, settings.reach, m.proof, &r)) climb(a, b, settings, m, &r);
+  return r;
+}
+
+ContactResult solve_contact(const Particle& a, const Particle& b, const ContactSettings& settings,
+                            PairMemory& memory) {
+  ContactResult r;
+  if (finite(a) && finite(b)) Ladder(a, b, settings, memory).solve(&r);
   return r;
 }
 

@@ -5,9 +5,9 @@
 
 namespace nurbs {
 
-// Everything a pair remembers, as plain doubles so that it can live in the host's contact history. All zeros
-// is an empty memory. The layout is private to the ladder (pair_memory.h).
-constexpr int kPairMemorySize = 56;
+// Everything a pair remembers, as plain doubles. All zeros is an empty memory; memory of other bodies, of
+// another size or another solver counts as empty. The layout is in pair_memory.h.
+constexpr int kPairMemorySize = 54;
 
 // Gap, normal and contact points of two particles. The rungs, each a function of pair_search.cpp: the budget
 // of the last proof and the bounding spheres (7 ns); the direction atlases (80 ns); the local model (65 ns);

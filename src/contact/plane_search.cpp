@@ -72,44 +72,55 @@ class PlaneLadder {
 
   ContactResult run() {
     ContactResult r;
-    const bool touched = memory_.touched(settings_.reach);
+    const bool touched = memory_.proof.contact != 0;
     if (!touched && safe(&r)) return r;
     if (!finite(particle_)) return r;
-    if (memory_.known >= 3 && local(&r)) return r;
+    if (local(&r)) return r;
+    solve(&r);
+    return r;
+  }
+
+  // The rungs that evaluate surfaces.
+  void solve(ContactResult* r) {
+    if (!finite(particle_)) return;
+    const bool touched = memory_.proof.contact != 0;
     axes_ = particle_.q.toRotationMatrix();
     d_ = axes_.transpose() * -normal_;
-    if (!touched && bounds(&r)) return r;
-    if (memory_.known >= 2 && warm(&r)) return r;
-    if (touched && bounds(&r)) return r;
-    search(&r);
-    return r;
+    if (!touched && bounds(r)) return;
+    if (memory_.on_b.patch >= 0 && warm(r)) return;
+    if (touched && bounds(r)) return;
+    search(r);
   }
 
  private:
   // The budget of the last solve, as for a pair, with a plane that does not turn.
   bool safe(ContactResult* r) const {
-    double gap = height_ - radius_;
-    if (memory_.known > 0)
-      gap = std::max(
-          gap, memory_.lower + (height_ - memory_.offset[0]) - radius_ * turned(particle_.q, memory_.q_a));
+    const double gap =
+        std::max(height_ - radius_, proven_gap(memory_.proof, height_ * normal_, Quat::Identity(), 0,
+                                               particle_.q, radius_, settings_.reach));
     if (!(gap > settings_.reach)) return false;
     set_apart(gap, Rung::safe, r);
     return true;
   }
 
   bool local(ContactResult* r) const {
-    const LocalSupport s = evaluate_local_support(memory_.model.b, particle_.q, memory_.q_a, -normal_);
-    if (!(s.valid && s.error <= 0.5 * tolerance_ && s.drift <= kLocalDrift * tolerance_)) return false;
-    const double error = s.error + kRoundoff * radius_;
+    if (!(memory_.model.unique > 0)) return false;
+    const Turn<double> identity = turn(Mat3::Identity());
+    const LocalContact c =
+        evaluate_local(memory_.model.a, memory_.model.b, identity, turn(particle_.q.toRotationMatrix()),
+                       triple(height_ * normal_), 0.0);
+    if (!serves(c, memory_.model.unique, settings_.tolerance, radius_)) return false;
+    const double error = c.error + kRoundoff * radius_;
     r->rung = Rung::local_model;
-    set_contact(s.h, s.h - error, s.h + error, s.point, r);
+    const Vec3 point = vec(c.point_b) - height_ * normal_;
+    const double h = height_ - c.gap;
+    set_contact(h, h - error, h + error, point, r);
     return true;
   }
 
   bool bounds(ContactResult* r) {
     const double lower = height_ - particle_.scale * shape_.atlas.support_upper(d_);
     if (!(lower > settings_.reach)) return false;
-    memory_.known = std::clamp(memory_.known, 1.0, 2.0);
     remember_pose(lower);
     set_apart(lower, Rung::bounds, r);
     return true;
@@ -120,7 +131,7 @@ class PlaneLadder {
     const SurfacePoint start = warm_point(memory_.on_b, shape_);
     if (!solve_warm(shape_, d_, start, settings_.tolerance * shape_.bounding_radius, &s)) return false;
     r->rung = Rung::warm;
-    const double turned2_before = turned2(particle_.q, memory_.q_a);
+    const double turned2_before = turned2(particle_.q, memory_.proof.q_b);
     finish(s.support, r);
     if (r->status == Status::converged) remember_model(s, turned2_before);
     return true;
@@ -128,7 +139,7 @@ class PlaneLadder {
 
   // The support mapping at large: across patches, from the last point or the atlas.
   void search(ContactResult* r) {
-    const bool warm = memory_.known >= 2;
+    const bool warm = memory_.on_b.patch >= 0;
     const SurfacePoint start{static_cast<int>(memory_.on_b.patch), memory_.on_b.u, memory_.on_b.v};
     r->rung = warm ? Rung::warm : Rung::cold;
     finish(find_hull_support(shape_, d_, warm ? &start : nullptr), r);
@@ -138,10 +149,8 @@ class PlaneLadder {
     r->iterations = s.iterations;
     const double scale = particle_.scale;
     set_contact(scale * s.h, scale * s.h, scale * s.upper, axes_ * (scale * s.point), r);
-    const bool follows = memory_.known >= 2;
-    memory_.known = 2;
     remember_pose(r->lower);
-    remember_point(s.where, follows, &memory_.on_b);
+    remember_point(s.where, &memory_.on_b);
   }
 
   // From the support along the plane's normal, its bounds and its point.
@@ -158,9 +167,9 @@ class PlaneLadder {
   }
 
   void remember_pose(double lower) {
-    memory_.offset[0] = height_;
-    store(particle_.q, memory_.q_a);
-    memory_.lower = lower;
+    drop_model(&memory_.model);
+    set_proof(normal_, lower, height_ * normal_, Quat::Identity(), particle_.q, &memory_.proof);
+    memory_.proof.contact = !(lower > settings_.reach);
   }
 
   // Worth it only if a body that turns as it just did would be served at least once. A plane asks one support
@@ -172,9 +181,10 @@ class PlaneLadder {
     JetLanes jet = s.jet;
     scale(particle_.scale, &jet);
     SupportModel& model = memory_.model.b;
-    if (!make_support_model(axes_, Vec3::Zero(), s.base, jet, rate, &model)) return;
+    if (!make_support_model(Mat3::Identity(), Vec3::Zero(), s.base, jet, rate, &model)) return;
     limit_turn(shape_, particle_.scale, kNormalMargin, &model);
-    memory_.known = 3;
+    memory_.model.a = plane_model(normal_);
+    memory_.model.unique = kFarAway;
   }
 
   const Particle& particle_;
@@ -192,7 +202,16 @@ class PlaneLadder {
 
 ContactResult find_plane_contact(const Particle& particle, const Vec3& origin, const Vec3& normal,
                                  const ContactSettings& settings, double* memory) {
-  return PlaneLadder(particle, normal.dot(particle.x - origin), normal, settings, memory_at(memory)).run();
+  PairMemory& m = memory_at(memory);
+  adopt(pair_stamp(stamp(normal), stamp(particle), Solver::ladder), &m);
+  return PlaneLadder(particle, normal.dot(particle.x - origin), normal, settings, m).run();
+}
+
+ContactResult solve_plane_contact(const Particle& particle, double height, const Vec3& normal,
+                                  const ContactSettings& settings, PairMemory& memory) {
+  ContactResult r;
+  PlaneLadder(particle, height, normal, settings, memory).solve(&r);
+  return r;
 }
 
 }  // namespace nurbs

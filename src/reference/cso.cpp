@@ -7,6 +7,7 @@
 #include <cmath>
 
 #include "body/support.h"
+#include "contact/pair_memory.h"
 #include "reference/cso_derivatives.h"
 #include "reference/trust_region.h"
 
@@ -286,6 +287,26 @@ ContactResult solve_cso(const Particle& a, const Particle& b, double tolerance, 
   result.iterations = iterations;
   if (start) *start = {result.status == Status::converged, result.normal, at.on_a, at.on_b};
   return result;
+}
+
+ContactResult find_contact_cso(const Particle& a, const Particle& b, const ContactSettings& settings,
+                               double* memory) {
+  if (!finite(a) || !finite(b)) return {};
+  PairMemory& m = memory_at(memory);
+  adopt(pair_stamp(stamp(a), stamp(b), Solver::cso), &m);
+  CsoStart start;
+  start.valid = m.on_a.patch >= 0;
+  start.direction = load(m.proof.direction);
+  start.on_a = warm_point(m.on_a, *a.shape);
+  start.on_b = warm_point(m.on_b, *b.shape);
+  const ContactResult r = solve_cso(a, b, settings.tolerance, &start);
+  const auto keep = [&](const SurfacePoint& at, PointMemory* to) {
+    *to = {start.valid ? static_cast<double>(at.patch) : -1.0, at.u, at.v, {0, 0}};
+  };
+  store(start.direction, m.proof.direction);
+  keep(start.on_a, &m.on_a);
+  keep(start.on_b, &m.on_b);
+  return r;
 }
 
 }  // namespace nurbs

@@ -16,4 +16,8 @@ struct CsoStart {  // where to begin; all-default means a cold start
 // minimiser's normals (eq. 8). `start`, when given, is used if valid and receives the solution.
 ContactResult solve_cso(const Particle& a, const Particle& b, double tolerance, CsoStart* start = nullptr);
 
+// The same with what find_contact keeps for a pair (kPairMemorySize doubles): starts from the last solution.
+ContactResult find_contact_cso(const Particle& a, const Particle& b, const ContactSettings& settings,
+                               double* memory);
+
 }  // namespace nurbs
