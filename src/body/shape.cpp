@@ -218,6 +218,8 @@ void set_gyration(Shape& s, const std::optional<Mat3>& given) {
   }
   s.principal_gyration = frame.moments;
   s.principal_axes = frame.axes;
+  s.inverse_gyration = s.gyration.inverse();
+  s.sphere_like = frame.moments[2] - frame.moments[0] <= 1e-13 * frame.moments[2];
 }
 
 // FNV-1a (Fowler, Noll & Vo) over the bytes of the surfaces.

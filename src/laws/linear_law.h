@@ -213,7 +213,7 @@ NURBS_INLINE void advance_linear(const LinearLawOf<Real>& law, const ContactGeom
   const Real along = compliance_along(a, g.arm_a, g.normal) + compliance_along(b, g.arm_b, g.normal);
   const Real mean_across = 0.5 * (compliance_trace(a, g.arm_a) + compliance_trace(b, g.arm_b) - along);
   if (Ledger) {
-    *work = {};
+    *work = ContactWorkOf<Real>{};
     HalfWork<Real> later = later_half(law, s, before, dt);
     later.normal = select(active, later.normal, zero);
     later.tangential = select(active, later.tangential, zero);

@@ -16,6 +16,8 @@
 #include "liggghts/host_error.h"
 #include "memory.h"
 #include "modify.h"
+#include "neighbor.h"
+#include "update.h"
 
 namespace LAMMPS_NS {
 
@@ -107,6 +109,30 @@ nurbs::Particle AtomVecNurbs::particle(int i) const {
   particle.x = Vec3(x_[i][0], x_[i][1], x_[i][2]);
   particle.q = to_quat(quaternion_[i]);
   return particle;
+}
+
+const nurbs::Bodies& AtomVecNurbs::update_bodies(int immobile) {
+  if (static_cast<int>(shape_table_.size()) != shapes_.count() + 1) {
+    shape_table_.assign(1, nullptr);
+    for (int k = 1; k <= shapes_.count(); ++k) shape_table_.push_back(shapes_.shape(k));
+  }
+  nurbs::BodyArrays arrays;
+  arrays.count = atom->nlocal + atom->nghost;
+  if (arrays.count > 0) {
+    arrays.x = x_[0];
+    arrays.velocity = v_[0];
+    arrays.spin = omega_[0];
+    arrays.quaternion = quaternion_[0];
+    arrays.mass = rmass_;
+    arrays.scale = scale_;
+    arrays.radius = radius_;
+    arrays.shape = shapetype_;
+    arrays.shapes = shape_table_.data();
+    arrays.mask = mask_;
+    arrays.immobile = immobile;
+  }
+  bodies_.update(arrays, update->dt, neighbor->ago == 0);
+  return bodies_;
 }
 
 Vec3 AtomVecNurbs::principal_inertia(int i) const {

@@ -11,11 +11,13 @@ AtomStyle(nurbs,AtomVecNurbs)
 #define LMP_ATOM_VEC_NURBS_H
 
 #include <string>
+#include <vector>
 
 #include "atom_vec.h"
 #include "contact/contact.h"
 #include "liggghts/shape_library.h"
 #include "motion/rotation.h"
+#include "scene/bodies.h"
 
 namespace LAMMPS_NS {
 
@@ -36,6 +38,11 @@ class AtomVecNurbs : public AtomVec {
   double scale(int i) const { return scale_[i]; }
   nurbs::Particle particle(int i) const;
   nurbs::Vec3 principal_inertia(int i) const;
+
+  // The bodies as the contacts of this step see them, owned and ghost ones: brought up to date by the first
+  // who computes forces in a step. Particles of the group `immobile` (a group bit) are not moved by forces.
+  const nurbs::Bodies& update_bodies(int immobile);
+  const nurbs::Bodies& bodies() const { return bodies_; }
 
   // Angular momentum of owned particle i about its centre of mass, lab axes. Between steps `omega` is what
   // counts, so that any command may set it; the momentum it was last made from is kept beside it and used as
@@ -118,6 +125,8 @@ class AtomVecNurbs : public AtomVec {
   std::string check_all_owned() const;
 
   ShapeLibrary shapes_;
+  std::vector<const nurbs::Shape*> shape_table_;  // by shape number; [0] is none
+  nurbs::Bodies bodies_;
 
   // The host's arrays (owned by Atom), and the one array Atom has no place for.
   int *tag_ = nullptr, *type_ = nullptr, *mask_ = nullptr, *shapetype_ = nullptr;

@@ -2,6 +2,7 @@
 #include "liggghts/fix_contact_history_nurbs.h"
 
 #include <algorithm>
+#include <cstring>
 
 #include "atom.h"
 #include "comm.h"
@@ -35,8 +36,17 @@ class BorrowedName {
 
 }  // namespace
 
-bool FixContactHistoryNurbs::serves_nurbs() const {
-  return dynamic_cast<PairGranNurbs*>(force->pair) != nullptr;
+PairGranNurbs* FixContactHistoryNurbs::pair() const {
+  return dynamic_cast<PairGranNurbs*>(force->pair);
+}
+
+nurbs::ContactPool& FixContactHistoryNurbs::pool() const {
+  return pair()->stages().pool();
+}
+
+// Of particle i and its partner number n.
+nurbs::PairProof& FixContactHistoryNurbs::proof(int i, int n) const {
+  return *reinterpret_cast<nurbs::PairProof*>(contacthistory_[i] + static_cast<std::size_t>(n) * dnum_);
 }
 
 void FixContactHistoryNurbs::init() {
@@ -79,26 +89,102 @@ void FixContactHistoryNurbs::for_each_neighbour(Flag flag) const {
 // call only.
 void FixContactHistoryNurbs::pre_exchange() {
   if (!serves_nurbs()) return FixContactHistory::pre_exchange();
-  for_each_neighbour([this](int& flag, const double* history) {
-    if (std::any_of(history, history + dnum_, [](double value) { return value != 0; })) flag |= kRemembers;
+  int most = 0;
+  for_each_neighbour([this](int& flag, double* history) {
+    auto& proof = *reinterpret_cast<nurbs::PairProof*>(history);
+    if (!pool().holds(proof.contact)) proof.contact = 0;
+    flag = (proof.contact != 0 ? kTouching : 0) | (proof.stamp != 0 ? kRemembers : 0);
   });
   FixContactHistory::pre_exchange();
   for_each_neighbour([](int& flag, const double*) { flag &= kTouching; });
+  for (int i = 0; i < atom->nlocal; ++i) most = std::max(most, count_contacts(i));
   // The host takes the maximum over fixes of what one particle sends; walls send theirs beside this.
   const int walls = modify->n_fixes_style("wall/nurbs");
   comm->maxexchange_fix =
-      std::max(comm->maxexchange_fix, (dnum_ + 1) * maxtouch_ + 1 + walls * nurbs_host::kHistorySize);
+      std::max(comm->maxexchange_fix, (dnum_ + 1) * maxtouch_ + 1 + most * nurbs::kContactSize +
+                                          walls * (nurbs::kProofSize + nurbs::kContactSize));
 }
 
 void FixContactHistoryNurbs::setup_pre_exchange() {
   if (computeflag_ != nullptr && *computeflag_) pre_exchange();
 }
 
+int FixContactHistoryNurbs::count_contacts(int i) const {
+  int count = 0;
+  for (int n = 0; n < npartner_[i]; ++n) count += pool().holds(proof(i, n).contact);
+  return count;
+}
+
+// The contacts of particle i, behind its proofs and in their order.
+int FixContactHistoryNurbs::put_contacts(int i, double* buffer) const {
+  int m = 0;
+  for (int n = 0; n < npartner_[i]; ++n) {
+    if (!pool().holds(proof(i, n).contact)) continue;
+    const nurbs::ContactRecord record = pool().get(proof(i, n).contact);
+    std::memcpy(buffer + m, &record, sizeof record);
+    m += nurbs::kContactSize;
+  }
+  return m;
+}
+
+// A number of another rank's or run's pool means only that a contact follows.
+int FixContactHistoryNurbs::get_contacts(int i, const double* buffer) {
+  int m = 0;
+  for (int n = 0; n < npartner_[i]; ++n) {
+    if (proof(i, n).contact == 0) continue;
+    nurbs::ContactRecord record;
+    std::memcpy(&record, buffer + m, sizeof record);
+    proof(i, n).contact = pool().add(record);
+    m += nurbs::kContactSize;
+  }
+  return m;
+}
+
+int FixContactHistoryNurbs::pack_exchange(int i, double* buffer) {
+  const int m = FixContactHistory::pack_exchange(i, buffer);
+  return serves_nurbs() ? m + put_contacts(i, buffer + m) : m;
+}
+
+int FixContactHistoryNurbs::unpack_exchange(int i, double* buffer) {
+  const int m = FixContactHistory::unpack_exchange(i, buffer);
+  return serves_nurbs() ? m + get_contacts(i, buffer + m) : m;
+}
+
+int FixContactHistoryNurbs::size_restart(int i) {
+  const int size = FixContactHistory::size_restart(i);
+  return serves_nurbs() ? size + count_contacts(i) * nurbs::kContactSize : size;
+}
+
+int FixContactHistoryNurbs::maxsize_restart() {
+  const int size = FixContactHistory::maxsize_restart();
+  if (!serves_nurbs()) return size;
+  int mine = 0, most = 0;
+  for (int i = 0; i < atom->nlocal; ++i) mine = std::max(mine, count_contacts(i));
+  MPI_Allreduce(&mine, &most, 1, MPI_INT, MPI_MAX, world);
+  return size + most * nurbs::kContactSize;
+}
+
+int FixContactHistoryNurbs::pack_restart(int i, double* buffer) {
+  int m = FixContactHistory::pack_restart(i, buffer);
+  if (serves_nurbs()) m += put_contacts(i, buffer + m);
+  buffer[0] = m;
+  return m;
+}
+
+void FixContactHistoryNurbs::unpack_restart(int i, int nth) {
+  FixContactHistory::unpack_restart(i, nth);
+  if (!serves_nurbs()) return;
+  const double* values = atom->extra[i];
+  for (int k = 0; k < nth; ++k) values += static_cast<int>(*values);
+  get_contacts(i, values + 2 + static_cast<std::size_t>(dnum_ + 1) * npartner_[i]);
+}
+
 // The host's restarts within a run hold per-particle history of the last reneighbouring; this one is of this
 // step.
 void FixContactHistoryNurbs::write_restart(FILE* file) {
   setup_pre_exchange();
-  double mine[2] = {dissipated_.damping, dissipated_.friction}, all[2] = {0, 0};
+  const nurbs::EnergyLedger done = serves_nurbs() ? pair()->stages().dissipated() : nurbs::EnergyLedger{};
+  double mine[2] = {done.damping, done.friction}, all[2] = {0, 0};
   MPI_Reduce(mine, all, 2, MPI_DOUBLE, MPI_SUM, 0, world);
   if (comm->me != 0) return;
   const double list[] = {static_cast<double>(dnum_), static_cast<double>(maxtouch_), all[0], all[1]};
@@ -109,11 +195,13 @@ void FixContactHistoryNurbs::write_restart(FILE* file) {
 
 void FixContactHistoryNurbs::restart(char* buffer) {
   FixContactHistory::restart(buffer);
+  if (!serves_nurbs()) return;
   const double* list = reinterpret_cast<const double*>(buffer);
-  dissipated_ = nurbs::EnergyLedger{};
+  nurbs::EnergyLedger& done = pair()->stages().dissipated();
+  done = nurbs::EnergyLedger{};
   if (comm->me != 0) return;
-  dissipated_.damping = list[2];
-  dissipated_.friction = list[3];
+  done.damping = list[2];
+  done.friction = list[3];
 }
 
 }  // namespace LAMMPS_NS

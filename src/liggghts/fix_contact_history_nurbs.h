@@ -1,7 +1,8 @@
 // fix contacthistory, as pair gran/nurbs needs it: the host's own (per-pair history across reneighbouring,
 // ranks and restarts) under the host's name, with four things changed. It finds the pair style under a name
-// other than "gran"; it keeps the history of neighbours that don't touch but have something to remember; its
-// pages have room for a long history; and it carries the dissipated energy, so that restarts do. With another
+// other than "gran"; it keeps the history of neighbours that don't touch but have something proven, the
+// PairProof, which is all that the host's history holds; the contacts of those that touch, which the pair
+// style owns (scene/contact_pool.h), travel behind it; and it carries the dissipated energy. With another
 // pair style it is the host's fix.
 #ifdef FIX_CLASS
 
@@ -13,7 +14,7 @@ FixStyle(contacthistory,FixContactHistoryNurbs)
 #define LMP_FIX_CONTACT_HISTORY_NURBS_H
 
 #include "fix_contact_history.h"
-#include "laws/energy_ledger.h"
+#include "scene/contact_pool.h"
 
 namespace LAMMPS_NS {
 
@@ -24,21 +25,29 @@ class FixContactHistoryNurbs : public FixContactHistory {
   void init() override;
   void pre_exchange() override;
   void setup_pre_exchange() override;
+  int pack_exchange(int i, double* buffer) override;
+  int unpack_exchange(int i, double* buffer) override;
   void write_restart(FILE* file) override;
   void restart(char* buffer) override;
-
-  // Dissipated by this rank's share of the pairs since the start (damping, friction).
-  nurbs::EnergyLedger& dissipated() { return dissipated_; }
+  int pack_restart(int i, double* buffer) override;
+  void unpack_restart(int i, int nth) override;
+  int size_restart(int i) override;
+  int maxsize_restart() override;
 
  protected:
   void allocate_pages() override;
 
  private:
-  bool serves_nurbs() const;
+  class PairGranNurbs* pair() const;
+  bool serves_nurbs() const { return pair() != nullptr; }
   template <class Flag>
   void for_each_neighbour(Flag flag) const;
 
-  nurbs::EnergyLedger dissipated_;
+  nurbs::PairProof& proof(int i, int n) const;
+  nurbs::ContactPool& pool() const;
+  int count_contacts(int i) const;
+  int put_contacts(int i, double* buffer) const;
+  int get_contacts(int i, const double* buffer);
 };
 
 }  // namespace LAMMPS_NS

@@ -13,16 +13,13 @@
 #include "liggghts/pair_gran_nurbs.h"
 #include "memory.h"
 #include "modify.h"
+#include "neighbor.h"
 #include "update.h"
 
 namespace LAMMPS_NS {
 
-using nurbs::ContactState;
 using nurbs::Vec3;
 using nurbs_host::fail_all;
-using nurbs_host::kHistorySize;
-using nurbs_host::memory_of;
-using nurbs_host::state_of;
 using Vec3Map = Eigen::Map<Vec3>;
 
 namespace {
@@ -52,7 +49,7 @@ FixWallNurbs::FixWallNurbs(LAMMPS* lmp, int narg, char** arg) : Fix(lmp, narg, a
 FixWallNurbs::~FixWallNurbs() {
   atom->delete_callback(id, 0);
   atom->delete_callback(id, 1);
-  memory->destroy(history_);
+  memory->destroy(proofs_);
 }
 
 void FixWallNurbs::parse_plane(int narg, char** arg) {
@@ -89,7 +86,8 @@ void FixWallNurbs::init() {
   for (int k = 0; k < modify->nfix; ++k)
     if (std::strcmp(modify->fix[k]->style, "freeze") == 0) freeze_groupbit_ = modify->fix[k]->groupbit;
   const int walls = static_cast<int>(all(lmp).size());
-  comm->maxexchange_fix = std::max(comm->maxexchange_fix, walls * kHistorySize);
+  comm->maxexchange_fix = std::max(comm->maxexchange_fix, walls * (nurbs::kProofSize + nurbs::kContactSize));
+  ledger_ = nurbs_host::wants_ledger(lmp);
   warn_periodic();
   warn_time_step();
 }
@@ -125,103 +123,106 @@ void FixWallNurbs::warn_time_step() {
 
 void FixWallNurbs::setup(int vflag) {
   post_force(vflag);
-  deep_.warn(lmp, std::string("Fix wall/nurbs ") + id,
-             "do particles reach through the wall, or is its normal reversed?", last_deep_warning_);
+  nurbs_host::warn_deep(lmp, stages_.deep(), std::string("Fix wall/nurbs ") + id,
+                        "do particles reach through the wall, or is its normal reversed?",
+                        last_deep_warning_);
 }
 
-void FixWallNurbs::post_force(int) {
-  step_.setup = update->setupflag != 0;
-  step_.dt = update->dt;
-  stored_ = nurbs::EnergyLedger{};
-  counts_ = nurbs_host::ContactCounts{};
-  force_ = torque_ = Vec3::Zero();
+void FixWallNurbs::hand_in_neighbours() {
+  stages_.begin_neighbours();
   for (int i = 0; i < atom->nlocal; ++i)
-    if (atom->mask[i] & groupbit) compute_particle(i);
+    if (atom->mask[i] & groupbit) stages_.add_neighbour(-1, i, &proof(i));
+  stages_.end_neighbours();
 }
 
-// As PairGranNurbs::compute_pair; here A is the wall.
-void FixWallNurbs::compute_particle(int i) {
-  const Vec3 separation = Vec3Map(atom->x[i]) - origin_;
-  const double height = normal_.dot(separation);
-  ContactState& state = state_of(history_[i]);
-  nurbs::ContactResult result;
-  result.status = nurbs::Status::separated;
-  if (height > atom->radius[i]) {
-    if (state.active == 0) return;
-  } else {
-    double scratch[nurbs::kPairMemorySize], *memory = memory_of(history_[i]);
-    if (step_.setup) {
-      std::copy_n(memory, nurbs::kPairMemorySize, scratch);
-      memory = scratch;
-    }
-    result = find_plane_contact(bodies_->particle(i), origin_, normal_, settings_, memory);
-    counts_.add(result, 1);
-    if (step_.setup) deep_.add(result, atom->radius[i], 1);
-    if (!nurbs_host::touches(result) && state.active == 0) return;
+// The wall is A: a plane of infinite mass whose normal no particle changes.
+void FixWallNurbs::post_force(int) {
+  const PairGranNurbs* pair = PairGranNurbs::find(lmp);
+  nurbs::ContactStages::Step step;
+  step.bodies = pair != nullptr ? &bodies_->bodies() : &bodies_->update_bodies(freeze_groupbit_);
+  if (neighbor->ago == 0) hand_in_neighbours();
+  Vec3Map{wall_.x} = origin_;
+  for (int k = 0; k < 9; k += 4) wall_.turn[k] = 1;
+  wall_.radius = nurbs::kFarAway;
+  step.wall = &wall_;
+  step.wall_normal = normal_;
+  step.owned = atom->nlocal;
+  step.dt = update->dt;
+  step.setup = update->setupflag != 0;
+  step.ledger = ledger_;
+  step.settings = settings_;
+  step.laws = &law_;
+  stages_.compute(step);
+  for (int i = 0; i < atom->nlocal; ++i) {
+    const nurbs::ContactStages::Sum sum = stages_.sum(i);
+    if (!sum.any) continue;
+    Vec3Map(atom->f[i]) += sum.force;
+    Vec3Map(atom->torque[i]) += sum.torque;
   }
-  step_.same = 10 * settings_.tolerance * atom->radius[i] + 1e-13 * (separation.norm() + origin_.norm());
-  if (step_contact(law_, result, nurbs::wall_geometry(result, separation), nurbs::BodyMotion{},
-                   nurbs_host::motion_of(*bodies_, *atom, i, update->dt, freeze_groupbit_), step_, state, 1,
-                   dissipated_, counts_))
-    apply(i, state);
-}
-
-void FixWallNurbs::apply(int i, const ContactState& state) {
-  const Vec3 force = force_on_b(state);
-  Vec3Map(atom->f[i]) += force;
-  Vec3Map(atom->torque[i]) += Eigen::Map<const Vec3>(state.arm_b).cross(force);
-  force_ -= force;
-  torque_ -= Eigen::Map<const Vec3>(state.arm_a).cross(force);
-  stored_.add(stored_energy(law_, state), 1);
 }
 
 double FixWallNurbs::compute_scalar() {
-  double mine = stored_.elastic(), all = 0;
+  double mine = stages_.stored().elastic(), all = 0;
   MPI_Allreduce(&mine, &all, 1, MPI_DOUBLE, MPI_SUM, world);
   return all;
 }
 
 double FixWallNurbs::compute_vector(int n) {
-  double mine = n < 3 ? force_[n] : torque_[n - 3], all = 0;
+  const nurbs::ContactStages::Sum sum = stages_.wall_sum();
+  double mine = n < 3 ? sum.force[n] : sum.torque[n - 3], all = 0;
   MPI_Allreduce(&mine, &all, 1, MPI_DOUBLE, MPI_SUM, world);
   return all;
 }
 
 void FixWallNurbs::append_rows(int rows_groupbit, std::vector<nurbs_host::ContactRow>& rows) const {
-  for (int i = 0; i < atom->nlocal; ++i) {
-    const ContactState& state = state_of(history_[i]);
-    if (state.active == 0 || !(atom->mask[i] & groupbit) || !(atom->mask[i] & rows_groupbit)) continue;
+  stages_.for_each_contact([&](const nurbs::ContactView& contact) {
+    const int i = contact.b;
+    if (!(atom->mask[i] & groupbit) || !(atom->mask[i] & rows_groupbit)) return;
     double point[3];
-    Vec3Map{point} = Vec3Map(atom->x[i]) + Eigen::Map<const Vec3>(state.arm_b);
+    Vec3Map{point} = Vec3Map(atom->x[i]) + Eigen::Map<const Vec3>(contact.state.arm_b);
     domain->remap(point);
-    rows.push_back(nurbs_host::make_row(atom->tag[i], 0, state, 1, Vec3(point)));
-  }
+    rows.push_back(nurbs_host::make_row(atom->tag[i], 0, contact.state, 1, Vec3(point)));
+  });
 }
 
 void FixWallNurbs::grow_arrays(int n) {
-  memory->grow(history_, n, kHistorySize, "wall/nurbs:history");
+  memory->grow(proofs_, n, nurbs::kProofSize, "wall/nurbs:proofs");
 }
 
 void FixWallNurbs::copy_arrays(int from, int to, int) {
-  std::copy_n(history_[from], kHistorySize, history_[to]);
+  proof(to) = proof(from);
 }
 
 void FixWallNurbs::set_arrays(int i) {
-  std::fill_n(history_[i], kHistorySize, 0.0);
+  proof(i) = nurbs::PairProof{};
 }
 
+// The proof, and behind it the contact if there is one; its number in another rank's or run's pool means only
+// that it follows.
 int FixWallNurbs::pack_exchange(int i, double* buffer) {
-  std::copy_n(history_[i], kHistorySize, buffer);
-  return kHistorySize;
+  nurbs::PairProof& own = proof(i);
+  const bool touching = stages_.pool().holds(own.contact);
+  if (!touching) own.contact = 0;
+  std::memcpy(buffer, &own, sizeof own);
+  if (!touching) return nurbs::kProofSize;
+  const nurbs::ContactRecord record = stages_.pool().get(own.contact);
+  std::memcpy(buffer + nurbs::kProofSize, &record, sizeof record);
+  return nurbs::kProofSize + nurbs::kContactSize;
 }
 
 int FixWallNurbs::unpack_exchange(int i, double* buffer) {
-  std::copy_n(buffer, kHistorySize, history_[i]);
-  return kHistorySize;
+  nurbs::PairProof& own = proof(i);
+  std::memcpy(&own, buffer, sizeof own);
+  if (own.contact == 0) return nurbs::kProofSize;
+  nurbs::ContactRecord record;
+  std::memcpy(&record, buffer + nurbs::kProofSize, sizeof record);
+  own.contact = stages_.pool().add(record);
+  return nurbs::kProofSize + nurbs::kContactSize;
 }
 
 void FixWallNurbs::write_restart(FILE* file) {
-  double mine[2] = {dissipated_.damping, dissipated_.friction}, all[2] = {0, 0};
+  const nurbs::EnergyLedger& done = stages_.dissipated();
+  double mine[2] = {done.damping, done.friction}, all[2] = {0, 0};
   MPI_Reduce(mine, all, 2, MPI_DOUBLE, MPI_SUM, 0, world);
   if (comm->me != 0) return;
   const int size = sizeof all;
@@ -231,26 +232,30 @@ void FixWallNurbs::write_restart(FILE* file) {
 
 void FixWallNurbs::restart(char* buffer) {
   const double* values = reinterpret_cast<const double*>(buffer);
-  dissipated_ = nurbs::EnergyLedger{};
+  nurbs::EnergyLedger& done = stages_.dissipated();
+  done = nurbs::EnergyLedger{};
   if (comm->me != 0) return;
-  dissipated_.damping = values[0];
-  dissipated_.friction = values[1];
+  done.damping = values[0];
+  done.friction = values[1];
+}
+
+int FixWallNurbs::size_restart(int i) {
+  return 1 + nurbs::kProofSize + (stages_.pool().holds(proof(i).contact) ? nurbs::kContactSize : 0);
 }
 
 int FixWallNurbs::pack_restart(int i, double* buffer) {
-  buffer[0] = kHistorySize + 1;
-  std::copy_n(history_[i], kHistorySize, buffer + 1);
-  return kHistorySize + 1;
+  buffer[0] = 1 + pack_exchange(i, buffer + 1);
+  return static_cast<int>(buffer[0]);
 }
 
 void FixWallNurbs::unpack_restart(int i, int nth) {
-  const double* values = atom->extra[i];
+  double* values = atom->extra[i];
   for (int k = 0; k < nth; ++k) values += static_cast<int>(*values);
-  std::copy_n(values + 1, kHistorySize, history_[i]);
+  unpack_exchange(i, values + 1);
 }
 
 double FixWallNurbs::memory_usage() {
-  return static_cast<double>(atom->nmax) * kHistorySize * sizeof(double);
+  return static_cast<double>(atom->nmax) * sizeof(nurbs::PairProof) + static_cast<double>(stages_.bytes());
 }
 
 }  // namespace LAMMPS_NS

@@ -44,19 +44,19 @@ class FixWallNurbs : public Fix {
   void restart(char* buffer) override;
   int pack_restart(int i, double* buffer) override;
   void unpack_restart(int i, int nth) override;
-  int size_restart(int) override { return nurbs_host::kHistorySize + 1; }
-  int maxsize_restart() override { return nurbs_host::kHistorySize + 1; }
+  int size_restart(int i) override;
+  int maxsize_restart() override { return 1 + nurbs::kProofSize + nurbs::kContactSize; }
   double memory_usage() override;
 
-  // This rank's share.
-  nurbs::EnergyLedger energy() const { return nurbs::EnergyLedger(stored_).add(dissipated_, 1); }
-  const nurbs_host::ContactCounts& counts() const { return counts_; }
+  // This rank's share. Dissipation is counted while there is a compute nurbs/energy.
+  nurbs::EnergyLedger energy() const { return stages_.stored().add(stages_.dissipated(), 1); }
+  const nurbs_host::ContactCounts& counts() const { return stages_.counts(); }
   void append_rows(int groupbit, std::vector<nurbs_host::ContactRow>& rows) const;
 
  private:
   void parse_plane(int narg, char** arg);
-  void compute_particle(int i);
-  void apply(int i, const nurbs::ContactState& state);
+  nurbs::PairProof& proof(int i) const { return *reinterpret_cast<nurbs::PairProof*>(proofs_[i]); }
+  void hand_in_neighbours();
   void warn_periodic();
   void warn_time_step();
 
@@ -65,13 +65,11 @@ class FixWallNurbs : public Fix {
   nurbs::ContactSettings settings_ = nurbs_host::contacts_only();
   AtomVecNurbs* bodies_ = nullptr;
   int freeze_groupbit_ = 0;
-  nurbs_host::ContactStep step_;
-  double** history_ = nullptr;  // per owned particle
-  nurbs::EnergyLedger stored_, dissipated_;
-  nurbs_host::ContactCounts counts_;
-  nurbs::Vec3 force_ = nurbs::Vec3::Zero(), torque_ = nurbs::Vec3::Zero();  // on the wall, this rank's share
+  double** proofs_ = nullptr;  // a PairProof per owned particle
+  nurbs::ContactStages stages_;
+  nurbs::BodyRecord wall_{};
+  bool ledger_ = false;
   bool periodic_warned_ = false;
-  nurbs_host::DeepContacts deep_;
   std::string last_warning_, last_deep_warning_;
 };
 

@@ -7,19 +7,18 @@
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
+#include <cstring>
 
-#include "atom.h"
+#include "compute.h"
 #include "domain.h"
 #include "lammps.h"
 #include "liggghts/host_error.h"
+#include "modify.h"
 
 namespace LAMMPS_NS::nurbs_host {
 
-using nurbs::BodyMotion;
 using nurbs::ContactCoefficients;
-using nurbs::ContactResult;
 using nurbs::ContactState;
-using nurbs::Status;
 using nurbs::Vec3;
 
 namespace {
@@ -92,85 +91,29 @@ ContactCoefficients parse_coefficients(LAMMPS* lmp, const std::string& user, int
   return law;
 }
 
-BodyMotion motion_of(const AtomVecNurbs& bodies, const Atom& atom, int i, double dt, int freeze_groupbit) {
-  const Vec3 velocity(atom.v[i][0], atom.v[i][1], atom.v[i][2]);
-  const Vec3 spin(atom.omega[i][0], atom.omega[i][1], atom.omega[i][2]);
-  if (atom.mask[i] & freeze_groupbit) {
-    BodyMotion frozen;
-    frozen.velocity = velocity;
-    frozen.spin = frozen.spin_before = spin;
-    return frozen;
-  }
-  const double* q = atom.quaternion[i];
-  const nurbs::Quat axes = nurbs::Quat(q[0], q[1], q[2], q[3]) * bodies.shape(i)->principal_axes;
-  return nurbs::body_motion(velocity, spin, atom.rmass[i], bodies.principal_inertia(i),
-                            axes.toRotationMatrix(), dt);
-}
-
 Vec3 box_edge(const Domain& domain, int k) {
   if (k == 0) return {domain.xprd, 0, 0};
   if (k == 1) return {domain.triclinic ? domain.xy : 0, domain.yprd, 0};
   return {domain.triclinic ? domain.xz : 0, domain.triclinic ? domain.yz : 0, domain.zprd};
 }
 
-void ContactCounts::add_safe(double weight) {
-  value[neighbours] += weight;
-  value[safe] += weight;
-}
-
-void ContactCounts::add(const ContactResult& result, double weight) {
-  value[neighbours] += weight;
-  if (result.rung != nurbs::Rung::none) value[safe + static_cast<int>(result.rung) - 1] += weight;
-  if (touches(result)) value[contacts] += weight;
-  value[iterations] += weight * result.iterations;
-  if (result.status == Status::unresolved) value[unresolved] += weight;
-}
-
-void DeepContacts::add(const ContactResult& result, double radius, double weight) {
-  if (!touches(result) || -result.gap <= kDepth * radius) return;
-  count += weight;
-  deepest = std::max(deepest, -result.gap / radius);
-}
-
-void DeepContacts::warn(LAMMPS* lmp, const std::string& user, const std::string& hint, std::string& last) {
-  DeepContacts all;
-  MPI_Allreduce(&count, &all.count, 1, MPI_DOUBLE, MPI_SUM, lmp->world);
-  MPI_Allreduce(&deepest, &all.deepest, 1, MPI_DOUBLE, MPI_MAX, lmp->world);
-  *this = DeepContacts{};
+void warn_deep(LAMMPS* lmp, const nurbs::DeepContacts& mine, const std::string& user, const std::string& hint,
+               std::string& last) {
+  nurbs::DeepContacts all;
+  MPI_Allreduce(&mine.count, &all.count, 1, MPI_DOUBLE, MPI_SUM, lmp->world);
+  MPI_Allreduce(&mine.deepest, &all.deepest, 1, MPI_DOUBLE, MPI_MAX, lmp->world);
   if (all.count == 0) return;
   char numbers[128];
   std::snprintf(numbers, sizeof numbers,
-                "contacts deeper than %g %% of the bounding radius: %.0f, deepest %.3g %%", 100 * kDepth,
-                all.count, 100 * all.deepest);
-  const std::string warning = user + ": at the start of the run " + numbers + "; " + hint;
-  warn_news(FLERR, lmp, warning, last);
+                "contacts deeper than %g %% of the bounding radius: %.0f, deepest %.3g %%",
+                100 * nurbs::DeepContacts::kDepth, all.count, 100 * all.deepest);
+  warn_news(FLERR, lmp, user + ": at the start of the run " + numbers + "; " + hint, last);
 }
 
-bool touches(const ContactResult& result) {
-  return result.status != Status::separated && result.gap < 0 && result.normal.squaredNorm() > 0.5;
-}
-
-bool step_contact(const ContactCoefficients& law, const ContactResult& result,
-                  const nurbs::ContactGeometry& geometry, const BodyMotion& a, const BodyMotion& b,
-                  const ContactStep& step, ContactState& state, double weight,
-                  nurbs::EnergyLedger& dissipated, ContactCounts& counts) {
-  if (step.setup) {
-    if (!touches(result)) return state = ContactState{}, false;
-    if (state.dt > 0 && same_geometry(state, geometry, step.same)) return true;
-    if (set_contact(law, geometry, a, b, state)) return true;
-    counts.value[ContactCounts::unresolved] += weight;
-    return false;
-  }
-  nurbs::EnergyLedger work;
-  if (touches(result)) {
-    if (!advance_contact(law, geometry, a, b, step.dt, state, work))
-      counts.value[ContactCounts::unresolved] += weight;
-  } else {
-    end_contact(law, a, b, step.dt, state, work);
-  }
-  dissipated.damping += weight * work.damping;
-  dissipated.friction += weight * work.friction;
-  return state.active != 0;
+bool wants_ledger(const LAMMPS* lmp) {
+  for (int k = 0; k < lmp->modify->ncompute; ++k)
+    if (std::strcmp(lmp->modify->compute[k]->style, "nurbs/energy") == 0) return true;
+  return false;
 }
 
 const char* ContactRow::name(int column) {

@@ -17,6 +17,7 @@
 #include "liggghts/host_error.h"
 #include "modify.h"
 #include "neigh_list.h"
+#include "neighbor.h"
 #include "update.h"
 
 namespace LAMMPS_NS {
@@ -25,9 +26,6 @@ using nurbs::ContactCoefficients;
 using nurbs::ContactState;
 using nurbs::Vec3;
 using nurbs_host::fail_all;
-using nurbs_host::kHistorySize;
-using nurbs_host::memory_of;
-using nurbs_host::state_of;
 using Vec3Map = Eigen::Map<Vec3>;
 
 namespace {
@@ -48,15 +46,9 @@ constexpr Refused kRefused[] = {{"wall/gran", "; use fix wall/nurbs"},
 
 }  // namespace
 
-struct PairGranNurbs::Neighbours {
-  int i, j;       // as the host lists them: i is owned
-  int a, b;       // in tag order
-  double weight;  // this rank's share of the pair
-};
-
 PairGranNurbs::PairGranNurbs(LAMMPS* lmp) : PairGran(lmp) {
   // Tag order makes every value independent of who lists the pair: none changes sign ("0").
-  for (int k = 0; k < kHistorySize; ++k) add_history_value("nurbs" + std::to_string(k), "0");
+  for (int k = 0; k < nurbs::kProofSize; ++k) add_history_value("nurbs" + std::to_string(k), "0");
 }
 
 PairGranNurbs* PairGranNurbs::find(LAMMPS* lmp) {
@@ -147,9 +139,12 @@ void PairGranNurbs::init_style() {
   require_all_laws();
   refuse_sphere_features();
   PairGran::init_style();
-  history_fix_ = dynamic_cast<FixContactHistoryNurbs*>(fix_history);
-  if (history_fix_ == nullptr)
+  if (dynamic_cast<FixContactHistoryNurbs*>(fix_history) == nullptr)
     fail_all(FLERR, lmp, "Pair gran/nurbs: fix contacthistory is not the NURBS one");
+  law_table_.assign(laws_.size(), nurbs::ContactCoefficients{});
+  for (size_t k = 0; k < laws_.size(); ++k)
+    if (laws_[k]) law_table_[k] = *laws_[k];
+  ledger_ = nurbs_host::wants_ledger(lmp);
   warn_short_box();
   warn_time_step();
 }
@@ -197,22 +192,20 @@ void PairGranNurbs::warn_time_step() {
   nurbs_host::warn_news(FLERR, lmp, warning, last_warning_);
 }
 
-PairGranNurbs::Neighbours PairGranNurbs::order(int i, int j) const {
-  const bool swap = atom->tag[j] < atom->tag[i];
-  return {i, j, swap ? j : i, swap ? i : j, j < atom->nlocal ? 1.0 : 0.5};
-}
-
-// Calls visit(pair, touch flag, history) for the pairs of the neighbour list.
-template <class Visit>
-void PairGranNurbs::for_each_neighbour(Visit visit) const {
-  const int length = const_cast<PairGranNurbs*>(this)->dnum();
+// A pair is solved in tag order, so that ranks that both own half of it compute the same bits.
+void PairGranNurbs::hand_in_neighbours() {
+  stages_.begin_neighbours();
+  const int* tag = atom->tag;
   for (int ii = 0; ii < list->inum; ++ii) {
     const int i = list->ilist[ii];
-    int* touch = listgranhistory->firstneigh[i];
-    double* history = listgranhistory->firstdouble[i];
-    for (int jj = 0; jj < list->numneigh[i]; ++jj, history += length)
-      visit(order(i, list->firstneigh[i][jj] & NEIGHMASK), touch[jj], history);
+    auto* proofs = reinterpret_cast<nurbs::PairProof*>(listgranhistory->firstdouble[i]);
+    for (int jj = 0; jj < list->numneigh[i]; ++jj) {
+      const int j = list->firstneigh[i][jj] & NEIGHMASK;
+      const bool swap = tag[j] < tag[i];
+      stages_.add_neighbour(swap ? j : i, swap ? i : j, proofs + jj);
+    }
   }
+  stages_.end_neighbours();
 }
 
 void PairGranNurbs::compute_force(int eflag, int vflag, int addflag) {
@@ -221,62 +214,47 @@ void PairGranNurbs::compute_force(int eflag, int vflag, int addflag) {
     ev_setup(eflag, vflag);
   else
     evflag = vflag_fdotr = 0;
-  step_.setup = shearupdate_ == 0;
-  step_.dt = update->dt;
-  stored_ = nurbs::EnergyLedger{};
-  counts_ = nurbs_host::ContactCounts{};
-  for_each_neighbour(
-      [this](const Neighbours& pair, int& touch, double* history) { compute_pair(pair, touch, history); });
-  if (step_.setup) deep_.warn(lmp, kUser, "do particles overlap?", last_deep_warning_);
+  nurbs::ContactStages::Step step;
+  step.bodies = &bodies_->update_bodies(freeze_group_bit_);
+  if (neighbor->ago == 0) hand_in_neighbours();
+  step.owned = atom->nlocal;
+  step.dt = update->dt;
+  step.setup = shearupdate_ == 0;
+  step.ledger = ledger_;
+  step.settings = settings_;
+  step.types = atom->type;
+  step.type_count = ntypes_ + 1;
+  step.laws = law_table_.data();
+  stages_.compute(step);
+  add_forces();
+  if (evflag || storeContactForces() || storeContactForcesStress())
+    stages_.for_each_contact([this](const nurbs::ContactView& contact) { tally(contact); });
+  keep_case();
+  if (step.setup)
+    nurbs_host::warn_deep(lmp, stages_.deep(), kUser, "do particles overlap?", last_deep_warning_);
   if (storeContactForces()) fix_contact_forces()->do_forward_comm();
   if (storeContactForcesStress()) fix_contact_forces_stress()->do_forward_comm();
 }
 
-void PairGranNurbs::compute_pair(const Neighbours& pair, int& touch, double* history) {
-  const Vec3 separation = Vec3Map(atom->x[pair.b]) - Vec3Map(atom->x[pair.a]);
-  const double reach = atom->radius[pair.a] + atom->radius[pair.b];
-  ContactState& state = state_of(history);
-  nurbs::ContactResult result;
-  result.status = nurbs::Status::separated;
-  double scratch[nurbs::kPairMemorySize], *memory = memory_of(history);
-  touch = 0;
-  if (separation.squaredNorm() > reach * reach) {
-    counts_.add_safe(pair.weight);
-    if (state.active == 0) return;
-  } else {
-    // At setup the memory stays as the last step left it, so that a run in two parts moves as one.
-    if (step_.setup) {
-      std::copy_n(memory, nurbs::kPairMemorySize, scratch);
-      memory = scratch;
-    }
-    result = find_contact(bodies_->particle(pair.a), bodies_->particle(pair.b), settings_, memory);
-    counts_.add(result, pair.weight);
-    if (step_.setup) deep_.add(result, std::min(atom->radius[pair.a], atom->radius[pair.b]), pair.weight);
-    if (result.status == nurbs::Status::unresolved) keep_case(pair);
-    if (!nurbs_host::touches(result) && state.active == 0) return;
+void PairGranNurbs::add_forces() {
+  for (int i = 0; i < atom->nlocal; ++i) {
+    const nurbs::ContactStages::Sum sum = stages_.sum(i);
+    if (!sum.any) continue;
+    const double factor = relax(i);
+    Vec3Map(atom->f[i]) += factor * sum.force;
+    Vec3Map(atom->torque[i]) += factor * sum.torque;
+    if (store_sum_normal_force()) *get_sum_normal_force_ptr(i) += sum.normal;
   }
-
-  const ContactCoefficients& coefficients = *law(atom->type[pair.a], atom->type[pair.b]);
-  const nurbs::ContactGeometry geometry = nurbs::pair_geometry(result, separation);
-  step_.same = 10 * settings_.tolerance * std::min(atom->radius[pair.a], atom->radius[pair.b]) +
-               1e-13 * (separation.norm() + Vec3Map(atom->x[pair.a]).norm());
-  if (!step_contact(coefficients, result, geometry,
-                    nurbs_host::motion_of(*bodies_, *atom, pair.a, update->dt, freeze_group_bit_),
-                    nurbs_host::motion_of(*bodies_, *atom, pair.b, update->dt, freeze_group_bit_), step_,
-                    state, pair.weight, history_fix_->dissipated(), counts_))
-    return;
-  touch = 1;
-  apply(pair, coefficients, state);
 }
 
 // The first unresolved pair a rank meets, as a file that tests can replay (io/pair_case.h).
-void PairGranNurbs::keep_case(const Neighbours& pair) {
-  if (case_kept_) return;
+void PairGranNurbs::keep_case() {
+  const nurbs::ContactStages::Unresolved& pair = stages_.unresolved();
+  if (case_kept_ || !pair.any) return;
   case_kept_ = true;
   const std::string file =
       "unresolved-" + std::to_string(atom->tag[pair.a]) + "-" + std::to_string(atom->tag[pair.b]) + ".json";
-  const bool written =
-      nurbs::write_pair_case(file, bodies_->particle(pair.a), bodies_->particle(pair.b), settings_);
+  const bool written = nurbs::write_pair_case(file, pair.particle_a, pair.particle_b, settings_);
   const std::string where =
       written ? "; the first is kept in " + file : "; " + file + " could not be written";
   error->warning(
@@ -284,88 +262,76 @@ void PairGranNurbs::keep_case(const Neighbours& pair) {
                  .c_str());
 }
 
-// Adds the forces of a contact to the owned particles, and what the host wants to know of it.
-void PairGranNurbs::apply(const Neighbours& pair, const ContactCoefficients& coefficients,
-                          const ContactState& state) {
-  const Vec3 force_b = force_on_b(state);
-  const Vec3 torque_a = -Eigen::Map<const Vec3>(state.arm_a).cross(force_b);
-  const Vec3 torque_b = Eigen::Map<const Vec3>(state.arm_b).cross(force_b);
-  const bool i_is_a = pair.i == pair.a;
-  double on_i[6], on_j[6];
-  Vec3Map{on_i} = i_is_a ? Vec3(-force_b) : force_b;
-  Vec3Map{on_i + 3} = i_is_a ? torque_a : torque_b;
-  Vec3Map{on_j} = i_is_a ? force_b : Vec3(-force_b);
-  Vec3Map{on_j + 3} = i_is_a ? torque_b : torque_a;
-
-  for (const auto& [k, load] : {std::pair(pair.i, on_i), std::pair(pair.j, on_j)}) {
-    if (k >= atom->nlocal) continue;
-    const double factor = relax(k);
-    Vec3Map(atom->f[k]) += factor * Vec3Map(load);
-    Vec3Map(atom->torque[k]) += factor * Vec3Map(load + 3);
-    if (store_sum_normal_force()) *get_sum_normal_force_ptr(k) += state.normal_force;
-  }
-
-  const nurbs::EnergyLedger energy = stored_energy(coefficients, state);
-  stored_.add(energy, pair.weight);
+// Energy and virial of one contact, and its force for host fixes that asked for it.
+void PairGranNurbs::tally(const nurbs::ContactView& contact) {
+  const ContactState& state = contact.state;
+  const Vec3 force = force_on_b(state);
+  double on_a[6], on_b[6];
+  Vec3Map{on_a} = -force;
+  Vec3Map{on_a + 3} = -Eigen::Map<const Vec3>(state.arm_a).cross(force);
+  Vec3Map{on_b} = force;
+  Vec3Map{on_b + 3} = Eigen::Map<const Vec3>(state.arm_b).cross(force);
   if (evflag) {
-    const Vec3 apart = Vec3Map(atom->x[pair.i]) - Vec3Map(atom->x[pair.j]);
-    ev_tally_xyz(pair.i, pair.j, atom->nlocal, 0, energy.elastic(), 0, on_i[0], on_i[1], on_i[2], apart.x(),
-                 apart.y(), apart.z());
+    const Vec3 apart = Vec3Map(atom->x[contact.a]) - Vec3Map(atom->x[contact.b]);
+    ev_tally_xyz(contact.a, contact.b, atom->nlocal, 0, stored_energy(*contact.law, state).elastic(), 0,
+                 on_a[0], on_a[1], on_a[2], apart.x(), apart.y(), apart.z());
   }
-  keep_contact_force(pair, on_i, on_j);
+  keep_contact_force(contact, on_a, on_b);
 }
 
-// For host fixes that asked for the force of every contact.
-void PairGranNurbs::keep_contact_force(const Neighbours& pair, const double* on_i, const double* on_j) {
-  const int *tag = atom->tag, i = pair.i, j = pair.j;
+void PairGranNurbs::keep_contact_force(const nurbs::ContactView& contact, const double* on_a,
+                                       const double* on_b) {
+  const int *tag = atom->tag, a = contact.a, b = contact.b;
   if (storeContactForces() && update->ntimestep % storeContactForcesEvery() == 0) {
     FixContactPropertyAtom* keep = fix_contact_forces();
-    if (keep->has_partner(i, tag[j]) == -1) keep->add_partner(i, tag[j], on_i);
-    if (keep->has_partner(j, tag[i]) == -1) keep->add_partner(j, tag[i], on_j);
+    if (keep->has_partner(a, tag[b]) == -1) keep->add_partner(a, tag[b], on_a);
+    if (keep->has_partner(b, tag[a]) == -1) keep->add_partner(b, tag[a], on_b);
   }
   if (storeContactForcesStress()) {
     FixContactPropertyAtom* keep = fix_contact_forces_stress();
-    const double of_i[] = {on_i[0], on_i[1], on_i[2], static_cast<double>(j)};
-    const double of_j[] = {on_j[0], on_j[1], on_j[2], static_cast<double>(i)};
-    if (keep->has_partner(i, tag[j]) == -1) keep->add_partner(i, tag[j], of_i);
-    if (keep->has_partner(j, tag[i]) == -1) keep->add_partner(j, tag[i], of_j);
+    const double of_a[] = {on_a[0], on_a[1], on_a[2], static_cast<double>(b)};
+    const double of_b[] = {on_b[0], on_b[1], on_b[2], static_cast<double>(a)};
+    if (keep->has_partner(a, tag[b]) == -1) keep->add_partner(a, tag[b], of_a);
+    if (keep->has_partner(b, tag[a]) == -1) keep->add_partner(b, tag[a], of_b);
   }
 }
 
-// compute pair/gran/local: the contacts as the history holds them; nothing is computed anew.
+// compute pair/gran/local: the contacts as they were left; nothing is computed anew. As `history` it shows
+// normal, tangential spring, arm, tangential force (three numbers each), overlap, normal force, and whether
+// it slides.
 void PairGranNurbs::report_contacts() {
   ComputePairGranLocal* local = cpl();
   if (local == nullptr) return;
-  for_each_neighbour([&](const Neighbours& pair, int&, double* history) {
-    const ContactState& state = state_of(history);
-    if (state.active == 0) return;
-    const bool i_is_a = pair.i == pair.a;
+  stages_.for_each_contact([&](const nurbs::ContactView& contact) {
+    const ContactState& state = contact.state;
+    const bool i_is_a = contact.a < atom->nlocal;
+    const int i = i_is_a ? contact.a : contact.b, j = i_is_a ? contact.b : contact.a;
     const Vec3 force = i_is_a ? Vec3(-force_on_b(state)) : force_on_b(state);
     const Vec3 arm(i_is_a ? state.arm_a : state.arm_b);
-    const Vec3 torque = arm.cross(force), point = Vec3Map(atom->x[pair.i]) + arm;
-    local->add_pair(pair.i, pair.j, force.x(), force.y(), force.z(), torque.x(), torque.y(), torque.z(),
-                    history, point.data());
+    const Vec3 torque = arm.cross(force), point = Vec3Map(atom->x[i]) + arm;
+    double shown[nurbs::kProofSize];
+    std::copy_n(state.normal, 3, shown);
+    std::copy_n(state.spring, 3, shown + 3);
+    std::copy_n(arm.data(), 3, shown + 6);
+    std::copy_n(state.tangential_force, 3, shown + 9);
+    shown[12] = state.overlap;
+    shown[13] = state.normal_force;
+    shown[14] = state.sliding;
+    double at[3] = {point.x(), point.y(), point.z()};
+    local->add_pair(i, j, force.x(), force.y(), force.z(), torque.x(), torque.y(), torque.z(), shown, at);
   });
   cpl_pair_finalize();
 }
 
 void PairGranNurbs::append_rows(int groupbit, std::vector<nurbs_host::ContactRow>& rows) const {
-  if (list == nullptr || listgranhistory == nullptr) return;
-  for_each_neighbour([&](const Neighbours& pair, int&, double* history) {
-    const ContactState& state = state_of(history);
-    if (state.active == 0 || !(atom->mask[pair.i] & atom->mask[pair.j] & groupbit)) return;
-    if (pair.j >= atom->nlocal && pair.i != pair.a) return;
+  stages_.for_each_contact([&](const nurbs::ContactView& contact) {
+    const int a = contact.a, b = contact.b;
+    if (a >= atom->nlocal || !(atom->mask[a] & atom->mask[b] & groupbit)) return;
     double point[3];
-    Vec3Map{point} = Vec3Map(atom->x[pair.a]) + Eigen::Map<const Vec3>(state.arm_a);
+    Vec3Map{point} = Vec3Map(atom->x[a]) + Eigen::Map<const Vec3>(contact.state.arm_a);
     domain->remap(point);
-    rows.push_back(nurbs_host::make_row(atom->tag[pair.a], atom->tag[pair.b], state, -1, Vec3(point)));
+    rows.push_back(nurbs_host::make_row(atom->tag[a], atom->tag[b], contact.state, -1, Vec3(point)));
   });
-}
-
-nurbs::EnergyLedger PairGranNurbs::energy() const {
-  nurbs::EnergyLedger all = stored_;
-  if (history_fix_ != nullptr) all.add(history_fix_->dissipated(), 1);
-  return all;
 }
 
 void PairGranNurbs::write_restart_settings(FILE* file) {

@@ -20,8 +20,6 @@ PairStyle(gran/nurbs,PairGranNurbs)
 
 namespace LAMMPS_NS {
 
-class FixContactHistoryNurbs;
-
 class PairGranNurbs : public PairGran {
  public:
   explicit PairGranNurbs(LAMMPS* lmp);
@@ -44,18 +42,23 @@ class PairGranNurbs : public PairGran {
   int64_t hashcode() override { return 0x4e5552425331; }
 
   const nurbs::ContactSettings& contact_settings() const { return settings_; }
-  // This rank's share, a pair across two ranks counting half on each.
-  nurbs::EnergyLedger energy() const;
-  const nurbs_host::ContactCounts& counts() const { return counts_; }
+  // This rank's share, a pair across two ranks counting half on each. Dissipation is counted while there is a
+  // compute nurbs/energy.
+  nurbs::EnergyLedger energy() const { return stages_.stored().add(stages_.dissipated(), 1); }
+  const nurbs_host::ContactCounts& counts() const { return stages_.counts(); }
   // Appends the contacts of the last force evaluation between particles of a group; a pair across two ranks
   // is listed by the owner of the smaller tag.
   void append_rows(int groupbit, std::vector<nurbs_host::ContactRow>& rows) const;
+
+  // The contacts themselves, for fix contacthistory, which carries them across ranks and restarts.
+  nurbs::ContactStages& stages() { return stages_; }
+
+  double memory_usage() override { return static_cast<double>(stages_.bytes() + bodies_->bodies().bytes()); }
 
  protected:
   void compute_force(int eflag, int vflag, int addflag) override;
 
  private:
-  struct Neighbours;  // i, j of the host's list, and the same as A, B in tag order
   using Law = std::optional<nurbs::ContactCoefficients>;
 
   Law& law(int itype, int jtype) { return laws_[static_cast<size_t>(itype) * (ntypes_ + 1) + jtype]; }
@@ -69,26 +72,22 @@ class PairGranNurbs : public PairGran {
   void warn_short_box();
   void warn_time_step();
 
-  Neighbours order(int i, int j) const;
-  template <class Visit>
-  void for_each_neighbour(Visit visit) const;
-  void keep_case(const Neighbours&);
-  void compute_pair(const Neighbours& pair, int& touch, double* history);
-  void apply(const Neighbours& pair, const nurbs::ContactCoefficients& law, const nurbs::ContactState& state);
-  void keep_contact_force(const Neighbours& pair, const double* on_i, const double* on_j);
+  void hand_in_neighbours();
+  void add_forces();
+  void keep_case();
+  void tally(const nurbs::ContactView& contact);
+  void keep_contact_force(const nurbs::ContactView& contact, const double* on_a, const double* on_b);
   void report_contacts();
 
   nurbs::ContactSettings settings_ = nurbs_host::contacts_only();
   bool case_kept_ = false;  // an unresolved pair was written
   int ntypes_ = 0;
   std::vector<Law> laws_;
+  std::vector<nurbs::ContactCoefficients> law_table_;  // laws_, all of them given
   AtomVecNurbs* bodies_ = nullptr;
-  FixContactHistoryNurbs* history_fix_ = nullptr;
-  nurbs_host::ContactStep step_;
-  nurbs::EnergyLedger stored_;
-  nurbs_host::ContactCounts counts_;
+  nurbs::ContactStages stages_;
+  bool ledger_ = false;
   bool short_box_warned_ = false;
-  nurbs_host::DeepContacts deep_;
   std::string last_warning_, last_deep_warning_;
 };
 

@@ -121,4 +121,55 @@ NURBS_INLINE Turn<double> turn(const Mat3& m) {
   return {{{m(0, 0), m(0, 1), m(0, 2)}, {m(1, 0), m(1, 1), m(1, 2)}, {m(2, 0), m(2, 1), m(2, 2)}}};
 }
 
+// Rows become columns: kWidth x kWidth numbers.
+NURBS_INLINE void transpose(Wide (&m)[kWidth]) {
+#ifdef __AVX512F__
+  Wide t[8], u[8];
+  for (int k = 0; k < 8; k += 2) {
+    t[k] = __builtin_shufflevector(m[k], m[k + 1], 0, 8, 2, 10, 4, 12, 6, 14);
+    t[k + 1] = __builtin_shufflevector(m[k], m[k + 1], 1, 9, 3, 11, 5, 13, 7, 15);
+  }
+  for (int k = 0; k < 8; k += 4)
+    for (int odd = 0; odd < 2; ++odd) {
+      const Wide &low = t[k + odd], &high = t[k + odd + 2];
+      u[k + odd] = __builtin_shufflevector(low, high, 0, 1, 8, 9, 4, 5, 12, 13);
+      u[k + odd + 2] = __builtin_shufflevector(low, high, 2, 3, 10, 11, 6, 7, 14, 15);
+    }
+  for (int k = 0; k < 4; ++k) {
+    m[k] = __builtin_shufflevector(u[k], u[k + 4], 0, 1, 2, 3, 8, 9, 10, 11);
+    m[k + 4] = __builtin_shufflevector(u[k], u[k + 4], 4, 5, 6, 7, 12, 13, 14, 15);
+  }
+#else
+  const Wide even01 = __builtin_shufflevector(m[0], m[1], 0, 4, 2, 6);
+  const Wide odd01 = __builtin_shufflevector(m[0], m[1], 1, 5, 3, 7);
+  const Wide even23 = __builtin_shufflevector(m[2], m[3], 0, 4, 2, 6);
+  const Wide odd23 = __builtin_shufflevector(m[2], m[3], 1, 5, 3, 7);
+  m[0] = __builtin_shufflevector(even01, even23, 0, 1, 4, 5);
+  m[1] = __builtin_shufflevector(odd01, odd23, 0, 1, 4, 5);
+  m[2] = __builtin_shufflevector(even01, even23, 2, 3, 6, 7);
+  m[3] = __builtin_shufflevector(odd01, odd23, 2, 3, 6, 7);
+#endif
+}
+
+// `count` (a multiple of kWidth) numbers of each of kWidth records: number k of lane l is to[k][l].
+template <int count>
+NURBS_INLINE void gather(const double* const (&record)[kWidth], Wide (&to)[count]) {
+  static_assert(count % kWidth == 0);
+  for (int first = 0; first < count; first += kWidth) {
+    Wide m[kWidth];
+    for (int l = 0; l < kWidth; ++l) std::memcpy(&m[l], record[l] + first, sizeof m[l]);
+    transpose(m);
+    for (int k = 0; k < kWidth; ++k) to[first + k] = m[k];
+  }
+}
+// The reverse, 8 numbers a record.
+NURBS_INLINE void scatter(const Wide (&from)[8], double (&record)[kWidth][8]) {
+  for (int first = 0; first < 8; first += kWidth) {
+    Wide m[kWidth];
+    for (int k = 0; k < kWidth; ++k) m[k] = from[first + k];
+    transpose(m);
+    for (int l = 0; l < kWidth; ++l) std::memcpy(record[l] + first, &m[l], sizeof m[l]);
+  }
+}
+
 }  // namespace nurbs

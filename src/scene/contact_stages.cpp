@@ -1,0 +1,606 @@
+#include "scene/contact_stages.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "laws/linear_law.h"
+#include "reference/cso.h"
+
+namespace nurbs {
+namespace {
+
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+constexpr double kBudgetShare = 1 - 1e-12;  // of a proven gap: sums of paths are rounded
+
+// Numbers `field` ... of the contacts `first` to first + kWidth - 1 of a block.
+NURBS_INLINE Wide lanes(const ContactBlock& block, int field, int first) {
+  Wide w;
+  std::memcpy(&w, &block.field[field][first], sizeof w);
+  return w;
+}
+NURBS_INLINE Triple<Wide> lanes3(const ContactBlock& block, int field, int first) {
+  return {lanes(block, field, first), lanes(block, field + 1, first), lanes(block, field + 2, first)};
+}
+NURBS_INLINE SupportModelOf<Wide> support_lanes(const ContactBlock& block, int field, int first) {
+  return {lanes3(block, field, first),     lanes3(block, field + 3, first), lanes3(block, field + 6, first),
+          lanes(block, field + 9, first),  lanes(block, field + 10, first), lanes(block, field + 11, first),
+          lanes(block, field + 12, first), lanes(block, field + 13, first)};
+}
+
+struct Pose {
+  Triple<Wide> x;
+  Turn<Wide> turn;
+  Wide radius, free;
+};
+NURBS_INLINE Pose gather_pose(const double* const (&record)[kWidth]) {
+  Wide f[16];
+  gather(record, f);
+  return {{f[0], f[1], f[2]}, {{{f[3], f[4], f[5]}, {f[6], f[7], f[8]}, {f[9], f[10], f[11]}}}, f[12], f[13]};
+}
+NURBS_INLINE BodyMotionOf<Wide> gather_motion(const double* const (&record)[kWidth]) {
+  Wide f[16];
+  gather(record, f);
+  return {{f[0], f[1], f[2]},
+          {f[3], f[4], f[5]},
+          {f[6], f[7], f[8]},
+          f[9],
+          f[10],
+          f[11],
+          f[12],
+          f[13],
+          f[14],
+          f[15]};
+}
+
+BodyMotion motion_of(const BodyRecord& r) {
+  BodyMotion m;
+  m.velocity = load(r.velocity);
+  m.spin = load(r.spin);
+  m.spin_before = load(r.spin_before);
+  m.inverse_mass = r.inverse_mass;
+  const double* i = r.inverse_inertia;
+  m.inverse_inertia << i[0], i[3], i[4], i[3], i[1], i[5], i[4], i[5], i[2];
+  return m;
+}
+
+}  // namespace
+
+// Of the eight contacts of a block: geometry in lab axes from A's centre of mass.
+struct alignas(64) ContactStages::Results {
+  double gap[kBlock], lower[kBlock];
+  double normal[3][kBlock], point[3][kBlock], offset[3][kBlock];  // point: midpoint of the two
+  double touching[kBlock];                                        // 1 or 0
+  double served[kBlock];
+
+  void set(int lane, const ContactResult& r, const Vec3& separation) {
+    gap[lane] = r.gap;
+    lower[lane] = r.lower;
+    touching[lane] = touches(r);
+    const Vec3 middle = 0.5 * (r.point_a + r.point_b);
+    for (int k = 0; k < 3; ++k) {
+      normal[k][lane] = r.normal[k];
+      point[k][lane] = middle[k];
+      offset[k][lane] = separation[k];
+    }
+  }
+  Vec3 normal_of(int lane) const { return {normal[0][lane], normal[1][lane], normal[2][lane]}; }
+  Vec3 offset_of(int lane) const { return {offset[0][lane], offset[1][lane], offset[2][lane]}; }
+  ContactGeometry geometry(int lane) const {
+    const Vec3 middle(point[0][lane], point[1][lane], point[2][lane]);
+    return {-gap[lane], normal_of(lane), middle, middle - offset_of(lane)};
+  }
+};
+
+void ContactCounts::add(const ContactResult& result, double weight) {
+  if (result.rung != Rung::none) value[safe + static_cast<int>(result.rung) - 1] += weight;
+  if (touches(result)) value[contacts] += weight;
+  value[iterations] += weight * result.iterations;
+  if (result.status == Status::unresolved) value[unresolved] += weight;
+}
+
+// --- neighbours
+// ----------------------------------------------------------------------------------------------
+
+void ContactStages::begin_neighbours() {
+  a_.clear();
+  b_.clear();
+  proofs_.clear();
+}
+
+// Contacts are put in the order of their neighbours, so that bodies' records are met again while cached.
+void ContactStages::end_neighbours() {
+  ContactPool old;
+  std::swap(old, pool_);
+  expiry_.assign(a_.size(), -kInfinity);
+  for (std::size_t k = 0; k < a_.size(); ++k) {
+    PairProof& proof = *proofs_[k];
+    if (!old.holds(proof.contact)) {
+      proof.contact = 0;
+      continue;
+    }
+    proof.contact = pool_.add(old.get(proof.contact));
+    ContactBlock& block = pool_.block(proof.contact);
+    const int lane = ContactPool::lane(proof.contact);
+    block.proof[lane] = &proof;
+    block.neighbour[lane] = static_cast<int>(k);
+    block.a[lane] = a_[k];
+    block.b[lane] = b_[k];
+    block.fresh[lane] = 0;
+    expiry_[k] = kInfinity;
+  }
+  renewed_ = true;
+}
+
+double ContactStages::path(int k) const {
+  const double* path = step_.bodies->path();
+  return (a_[k] < 0 ? 0 : path[a_[k]]) + path[b_[k]];
+}
+
+std::uint64_t ContactStages::stamp_of(int a, int b) const {
+  const Bodies& bodies = *step_.bodies;
+  if (a < 0) return pair_stamp(stamp(step_.wall_normal), bodies.stamp(b), Solver::ladder);
+  return pair_stamp(bodies.stamp(a), bodies.stamp(b), step_.settings.solver);
+}
+
+int ContactStages::law_of(int a, int b) const {
+  return step_.types == nullptr ? 0 : step_.types[a] * step_.type_count + step_.types[b];
+}
+
+Vec3 ContactStages::offset(int a, int b) const {
+  return load(record(b).x) - load(record(a).x);
+}
+
+double ContactStages::smaller_radius(int a, int b) const {
+  return std::min(record(a).radius, record(b).radius);
+}
+
+// What was remembered of bodies as they are no longer, or by another solver, is dropped; the law's state
+// stays.
+void ContactStages::check_stamps() {
+  for (std::size_t k = 0; k < a_.size(); ++k) {
+    PairProof& proof = *proofs_[k];
+    if (proof.contact == 0) {
+      expiry_[k] = -kInfinity;
+      continue;
+    }
+    ContactBlock& block = pool_.block(proof.contact);
+    const int lane = ContactPool::lane(proof.contact);
+    block.law[lane] = law_of(a_[k], b_[k]);
+    const std::uint64_t stamp = stamp_of(a_[k], b_[k]);
+    if (proof.stamp == stamp) continue;
+    PairMemory empty{};
+    adopt(stamp, &empty);
+    empty.proof.contact = proof.contact;
+    proof = empty.proof;
+    block.set(lane, 0, kLocalModelSize, &empty.model);
+    block.set(lane, kLocalModelSize, 5, &empty.on_a);
+    block.set(lane, kLocalModelSize + 5, 5, &empty.on_b);
+  }
+}
+
+// --- stage (b)
+// -----------------------------------------------------------------------------------------------
+
+void ContactStages::check_budgets() {
+  const double* path = step_.bodies->path();
+  const int count = static_cast<int>(a_.size());
+  if (step_.wall != nullptr) {
+    for (int k = 0; k < count; ++k)
+      if (!(path[b_[k]] < expiry_[k])) look(k);
+    return;
+  }
+  constexpr int kRun = 16;
+  int k = 0;
+  for (; k + kRun <= count; k += kRun) {
+    const int *a = &a_[k], *b = &b_[k];
+    const double* expiry = &expiry_[k];
+    int over = 0;
+    for (int n = 0; n < kRun; ++n) over += !(path[a[n]] + path[b[n]] < expiry[n]);
+    if (over == 0) continue;
+    for (int n = 0; n < kRun; ++n)
+      if (!(path[a[n]] + path[b[n]] < expiry[n])) look(k + n);
+  }
+  for (; k < count; ++k)
+    if (!(path[a_[k]] + path[b_[k]] < expiry_[k])) look(k);
+}
+
+// Lower bound of the gap without a look at the surfaces: bounding spheres, and the last proof.
+double ContactStages::proven(int k) const {
+  const int a = a_[k], b = b_[k];
+  const PairProof& proof = *proofs_[k];
+  const BodyRecord& rb = record(b);
+  const Particle body = step_.bodies->particle(b);
+  if (a < 0) {
+    const double height = step_.wall_normal.dot(offset(a, b));
+    return std::max(height - rb.radius,
+                    proven_gap(proof, height * step_.wall_normal, Quat::Identity(), 0, body.q, rb.radius, 0));
+  }
+  const Vec3 apart = offset(a, b);
+  const double ra = record(a).radius, reach = ra + rb.radius, spheres2 = apart.squaredNorm();
+  const double spheres = spheres2 > reach * reach ? std::sqrt(spheres2) - reach : -kInfinity;
+  const Particle first = step_.bodies->particle(a);
+  return std::max(spheres, proven_gap(proof, apart, first.q, ra, body.q, rb.radius, 0));
+}
+
+// A neighbour whose budget is used up: proven apart anew, or solved.
+void ContactStages::look(int k) {
+  const int a = a_[k], b = b_[k];
+  PairProof& proof = *proofs_[k];
+  PairMemory memory{};
+  memory.proof = proof;
+  adopt(stamp_of(a, b), &memory);
+  if (proof.stamp != memory.proof.stamp) {
+    proof = memory.proof;
+    proof.on_a = proof.on_b = coarse(memory.on_a);
+  } else {
+    const double lower = proven(k);
+    if (lower > 0) {
+      expiry_[k] = path(k) + kBudgetShare * lower;
+      return;
+    }
+  }
+  memory.on_a = fine(proof.on_a);
+  memory.on_b = fine(proof.on_b);
+  drop_model(&memory.model);
+  const ContactResult r = search(a, b, memory);
+  count(r, a, b);
+  expiry_[k] = -kInfinity;
+  if (r.rung == Rung::none && !touches(r)) return;  // poses that are no numbers
+  const bool apart = r.lower > 0 || r.status == Status::separated;
+  if (step_.setup && apart) return;
+  proof = memory.proof;
+  proof.on_a = coarse(memory.on_a);
+  proof.on_b = coarse(memory.on_b);
+  proof.contact = 0;
+  if (apart) {
+    if (has_proof(proof)) expiry_[k] = path(k) + kBudgetShare * r.lower;
+    return;
+  }
+  ContactRecord record{memory.model, memory.on_a, memory.on_b, {}, {0, 0, 0}, 1, 0};
+  proof.contact = pool_.add(record);
+  ContactBlock& block = pool_.block(proof.contact);
+  const int lane = ContactPool::lane(proof.contact);
+  block.proof[lane] = &proof;
+  block.neighbour[lane] = k;
+  block.a[lane] = a;
+  block.b[lane] = b;
+  block.law[lane] = law_of(a, b);
+  fresh_.push_back(r);
+  block.fresh[lane] = static_cast<int>(fresh_.size());
+  expiry_[k] = kInfinity;
+}
+
+ContactResult ContactStages::search(int a, int b, PairMemory& memory) {
+  const Particle body = step_.bodies->particle(b);
+  if (a < 0) {
+    ContactResult r = solve_plane_contact(body, step_.wall_normal.dot(offset(a, b)), step_.wall_normal,
+                                          step_.settings, memory);
+    const Vec3 apart = offset(a, b);  // its points are relative to the body
+    r.point_a += apart;
+    r.point_b += apart;
+    return r;
+  }
+  const Particle first = step_.bodies->particle(a);
+  if (step_.settings.solver == Solver::cso)
+    return find_contact_cso(first, body, step_.settings, reinterpret_cast<double*>(&memory));
+  return solve_contact(first, body, step_.settings, memory);
+}
+
+void ContactStages::count(const ContactResult& r, int a, int b) {
+  const double weight = share(a, b);
+  counts_.add(r, weight);
+  if (r.status == Status::unresolved && !unresolved_.any) {
+    unresolved_.any = true;
+    unresolved_.a = a;
+    unresolved_.b = b;
+    unresolved_.particle_b = step_.bodies->particle(b);
+    if (a >= 0) unresolved_.particle_a = step_.bodies->particle(a);
+  }
+  if (!step_.setup || !touches(r)) return;
+  const double depth = -r.gap / smaller_radius(a, b);
+  if (depth <= DeepContacts::kDepth) return;
+  deep_.count += weight;
+  deep_.deepest = std::max(deep_.deepest, depth);
+}
+
+// --- stages (c) to (f)
+// ---------------------------------------------------------------------------------------
+
+void ContactStages::compute(const Step& step) {
+  step_ = step;
+  counts_ = ContactCounts{};
+  deep_ = DeepContacts{};
+  unresolved_ = Unresolved{};
+  fresh_.clear();
+  sums_.resize(step.owned);
+  std::fill(sums_.begin(), sums_.end(), Accumulator{});
+  wall_sum_ = Accumulator{};
+  if (renewed_ || step.bodies->reshaped() || step.setup) check_stamps();
+  renewed_ = false;
+  check_budgets();
+  for (ContactBlock& block : pool_.blocks())
+    if (block.used != 0) compute_block(block);
+
+  double all = 0;
+  for (std::size_t k = 0; k < a_.size(); ++k) all += share(a_[k], b_[k]);
+  double others = 0;
+  for (int n = ContactCounts::bounds; n <= ContactCounts::fallback; ++n) others += counts_.value[n];
+  counts_.value[ContactCounts::neighbours] = all;
+  counts_.value[ContactCounts::safe] = std::max(0.0, all - others);
+}
+
+// Stage (c) for the contacts first to first + kWidth - 1.
+void ContactStages::serve(const ContactBlock& block, int first, Results& results) const {
+  const double *of_a[kWidth], *of_b[kWidth];
+  for (int l = 0; l < kWidth; ++l) {
+    const bool used = block.used >> (first + l) & 1;
+    const BodyRecord &ra = record(used ? block.a[first + l] : block.b[first]),
+                     &rb = step_.bodies->record(used ? block.b[first + l] : 0);
+    of_a[l] = ra.x;
+    of_b[l] = rb.x;
+  }
+  const Pose a = gather_pose(of_a), b = gather_pose(of_b);
+  const Triple<Wide> offset = b.x - a.x;
+  const LocalContactOf<Wide> c = evaluate_local(
+      support_lanes(block, 0, first), support_lanes(block, 14, first), a.turn, b.turn, offset, a.free);
+  const WideMask served =
+      serves<Wide>(c, lanes(block, 28, first), step_.settings.tolerance, smaller(a.radius, b.radius));
+  const Wide zero{}, one = all<Wide>(1);
+  const Wide roundoff = kRoundoff * (magnitude(offset.x) + magnitude(offset.y) + magnitude(offset.z));
+  const Wide lower = c.gap - c.error - roundoff;
+  const Triple<Wide> middle = all<Wide>(0.5) * (c.point_a + c.point_b);
+  const auto put = [first](const Wide& w, double(&to)[kBlock]) { std::memcpy(&to[first], &w, sizeof w); };
+  put(c.gap, results.gap);
+  put(lower, results.lower);
+  put(c.normal.x, results.normal[0]);
+  put(c.normal.y, results.normal[1]);
+  put(c.normal.z, results.normal[2]);
+  put(middle.x, results.point[0]);
+  put(middle.y, results.point[1]);
+  put(middle.z, results.point[2]);
+  put(offset.x, results.offset[0]);
+  put(offset.y, results.offset[1]);
+  put(offset.z, results.offset[2]);
+  put(select((c.gap < 0.0) & (lower <= 0.0), one, zero), results.touching);
+  put(select(served, one, zero), results.served);
+}
+
+// Stage (d) for one contact.
+void ContactStages::solve_lane(ContactBlock& block, int lane, Results& results) {
+  const int a = block.a[lane], b = block.b[lane];
+  PairMemory memory;
+  memory.proof = *block.proof[lane];
+  block.get(lane, kLocalModelSize, 5, &memory.on_a);
+  block.get(lane, kLocalModelSize + 5, 5, &memory.on_b);
+  drop_model(&memory.model);
+  const ContactResult r = search(a, b, memory);
+  count(r, a, b);
+  results.set(lane, r, offset(a, b));
+  if (r.status == Status::separated) results.lower[lane] = std::max(results.lower[lane], 0.0);
+  if (step_.setup) return;  // what is remembered stays, so that a run in two parts moves as one
+  const std::int32_t contact = block.proof[lane]->contact;
+  *block.proof[lane] = memory.proof;
+  block.proof[lane]->contact = contact;
+  block.set(lane, 0, kLocalModelSize, &memory.model);
+  block.set(lane, kLocalModelSize, 5, &memory.on_a);
+  block.set(lane, kLocalModelSize + 5, 5, &memory.on_b);
+}
+
+void ContactStages::compute_block(ContactBlock& block) {
+  Results results;
+  for (int first = 0; first < kBlock; first += kWidth) serve(block, first, results);
+  double touching = 0;
+  for (int lane = 0; lane < kBlock; ++lane) {
+    if (!(block.used >> lane & 1)) {
+      results.touching[lane] = 0;
+      continue;
+    }
+    const int a = block.a[lane], b = block.b[lane];
+    const bool local = block.fresh[lane] == 0 && results.served[lane] != 0;
+    if (block.fresh[lane] != 0) {
+      results.set(lane, fresh_[block.fresh[lane] - 1], offset(a, b));
+      block.fresh[lane] = 0;
+    } else if (local) {
+      const double weight = share(a, b);
+      counts_.value[ContactCounts::local_model] += weight;
+      counts_.value[ContactCounts::contacts] += weight * results.touching[lane];
+    } else {
+      solve_lane(block, lane, results);
+    }
+    if (step_.setup) {
+      start_run(block, lane, results);
+      continue;
+    }
+    if (results.touching[lane] != 0) {
+      ++touching;
+      continue;
+    }
+    close(block, lane);
+    if (!(results.lower[lane] > 0)) continue;
+    if (local) {
+      PairProof& proof = *block.proof[lane];
+      const Vec3 apart = a < 0 ? Vec3(step_.wall_normal.dot(offset(a, b)) * step_.wall_normal) : offset(a, b);
+      set_proof(results.normal_of(lane), results.lower[lane], apart,
+                a < 0 ? Quat::Identity() : step_.bodies->particle(a).q, step_.bodies->particle(b).q, &proof);
+    }
+    release(block, lane, results.lower[lane]);
+  }
+  if (touching == 0) return;
+  for (int first = 0; first < kBlock; first += kWidth)
+    step_.ledger ? apply_law<true>(block, first, results) : apply_law<false>(block, first, results);
+}
+
+// The state stays as it is when the bodies are where it was made, so that a run in two parts moves as one;
+// else it is made anew.
+void ContactStages::start_run(ContactBlock& block, int lane, const Results& results) {
+  const int a = block.a[lane], b = block.b[lane];
+  const ContactGeometry geometry = results.geometry(lane);
+  ContactState state{};
+  const ContactCoefficients& law = step_.laws[block.law[lane]];
+  if (results.touching[lane] != 0) {
+    block.get(lane, kStateField, kContactStateSize, &state);
+    const double same = 10 * step_.settings.tolerance * smaller_radius(a, b) +
+                        1e-13 * (results.offset_of(lane).norm() + load(record(a).x).norm());
+    const bool goes_on = state.dt > 0 && same_geometry(state, geometry, same);
+    if (!goes_on && !set_contact(law, geometry, motion_of(record(a)), motion_of(record(b)), state))
+      counts_.value[ContactCounts::unresolved] += share(a, b);
+  }
+  block.set(lane, kStateField, kContactStateSize, &state);
+  if (state.active == 0) {
+    if (results.lower[lane] > 0) release(block, lane, -kInfinity);
+    return;
+  }
+  const Vec3 force = force_on_b(state);
+  double load_b[8], load_a[8];
+  store(force, load_b);
+  store(Vec3(load(state.arm_b).cross(force)), load_b + 3);
+  store(Vec3(-force), load_a);
+  store(Vec3(-load(state.arm_a).cross(force)), load_a + 3);
+  load_a[6] = load_b[6] = state.normal_force;
+  load_a[7] = load_b[7] = 1;
+  add_load(a, load_a);
+  add_load(b, load_b);
+}
+
+// Ends the law's part of a contact that has opened since the last step.
+void ContactStages::close(ContactBlock& block, int lane) {
+  if (block.field[kStateField][lane] == 0) return;
+  ContactState state;
+  block.get(lane, kStateField, kContactStateSize, &state);
+  const int a = block.a[lane], b = block.b[lane];
+  if (step_.ledger) {
+    EnergyLedger work;
+    end_contact(step_.laws[block.law[lane]], motion_of(record(a)), motion_of(record(b)), step_.dt, state,
+                work);
+    dissipated_.add(work, share(a, b));
+  }
+  state = ContactState{};
+  block.set(lane, kStateField, kContactStateSize, &state);
+}
+
+// Makes a contact a mere neighbour, proven `lower` apart.
+void ContactStages::release(ContactBlock& block, int lane, double lower) {
+  PairProof& proof = *block.proof[lane];
+  const int k = block.neighbour[lane];
+  PointMemory on[2];
+  block.get(lane, kLocalModelSize, 10, on);
+  proof.on_a = coarse(on[0]);
+  proof.on_b = coarse(on[1]);
+  expiry_[k] = has_proof(proof) ? path(k) + kBudgetShare * lower : -kInfinity;
+  pool_.remove(proof.contact);
+  proof.contact = 0;
+}
+
+// Stages (e) and (f) for the contacts first to first + kWidth - 1.
+template <bool ledger>
+void ContactStages::apply_law(ContactBlock& block, int first, const Results& results) {
+  const auto got = [first](const double(&from)[kBlock]) {
+    Wide w;
+    std::memcpy(&w, &from[first], sizeof w);
+    return w;
+  };
+  const Wide zero{};
+  const WideMask touching = got(results.touching) != 0.0;
+  if (none_of(touching)) return;
+  const double *of_a[kWidth], *of_b[kWidth];
+  LinearLawOf<Wide> law;
+  for (int l = 0; l < kWidth; ++l) {
+    const bool used = results.touching[first + l] != 0;
+    of_a[l] = used ? record(block.a[first + l]).velocity : step_.bodies->record(0).velocity;
+    of_b[l] = used ? record(block.b[first + l]).velocity : step_.bodies->record(0).velocity;
+    const ContactCoefficients& c = step_.laws[used ? block.law[first + l] : 0];
+    law.kn[l] = c.kn;
+    law.kt[l] = c.kt;
+    law.cn[l] = c.cn;
+    law.ct[l] = c.ct;
+    law.mu[l] = c.mu;
+  }
+  const BodyMotionOf<Wide> a = gather_motion(of_a), b = gather_motion(of_b);
+  ContactGeometryOf<Wide> g;
+  g.overlap = zero - got(results.gap);
+  g.normal = {got(results.normal[0]), got(results.normal[1]), got(results.normal[2])};
+  g.arm_a = {got(results.point[0]), got(results.point[1]), got(results.point[2])};
+  g.arm_b = g.arm_a - Triple<Wide>{got(results.offset[0]), got(results.offset[1]), got(results.offset[2])};
+
+  ContactStateOf<Wide> state;
+  Wide* const fields = reinterpret_cast<Wide*>(&state);
+  for (int k = 0; k < kContactStateSize; ++k) fields[k] = lanes(block, kStateField + k, first);
+  ContactWorkOf<Wide> work{};
+  advance_linear<Wide, ledger>(law, g, a, b, step_.dt, &state, &work);
+
+  const Triple<Wide> force = state.normal_force * state.normal + state.tangential_force;
+  const Triple<Wide> torque_a = cross(force, g.arm_a), torque_b = cross(g.arm_b, force);
+  const Wide sum = force.x + force.y + force.z + torque_a.x + torque_a.y + torque_a.z + torque_b.x +
+                   torque_b.y + torque_b.z + state.rate + work.damping + work.friction;
+  const WideMask good = touching & ((sum - sum) == 0.0);
+  for (int k = 0; k < kContactStateSize; ++k) {
+    const Wide keep = select(good, fields[k], zero);
+    std::memcpy(&block.field[kStateField + k][first], &keep, sizeof keep);
+  }
+  double load_a[kWidth][8], load_b[kWidth][8];
+  scatter({force.x, force.y, force.z, torque_b.x, torque_b.y, torque_b.z, state.normal_force, all<Wide>(1)},
+          load_b);
+  scatter({zero - force.x, zero - force.y, zero - force.z, torque_a.x, torque_a.y, torque_a.z,
+           state.normal_force, all<Wide>(1)},
+          load_a);
+  for (int l = 0; l < kWidth; ++l) {
+    if (results.touching[first + l] == 0) continue;
+    const int body_a = block.a[first + l], body_b = block.b[first + l];
+    if (!good[l]) {
+      counts_.value[ContactCounts::unresolved] += share(body_a, body_b);
+      continue;
+    }
+    add_load(body_a, load_a[l]);
+    add_load(body_b, load_b[l]);
+    if (ledger) {
+      const double weight = share(body_a, body_b);
+      dissipated_.damping += weight * work.damping[l];
+      dissipated_.friction += weight * work.friction[l];
+    }
+  }
+}
+
+// Sums that keep what each addition loses (Neumaier's variant of Kahan's, by Knuth's two-sum): the same bits
+// in whatever order the contacts come, but for the rounding of the rounding errors.
+void ContactStages::add_load(int body, const double* load) {
+  if (body >= step_.owned) return;
+  Accumulator& to = body < 0 ? wall_sum_ : sums_[body];
+  Lane8 x, high, low;
+  std::memcpy(&x, load, sizeof x);
+  std::memcpy(&high, to.high, sizeof high);
+  std::memcpy(&low, to.low, sizeof low);
+  const Lane8 sum = high + x, part = sum - high;
+  low += (high - (sum - part)) + (x - part);
+  std::memcpy(to.high, &sum, sizeof sum);
+  std::memcpy(to.low, &low, sizeof low);
+}
+
+ContactStages::Sum ContactStages::total(const Accumulator& s) {
+  double t[8];
+  for (int k = 0; k < 8; ++k) t[k] = s.high[k] + s.low[k];
+  return {load(t), load(t + 3), t[6], t[7] != 0};
+}
+
+// --- reports
+// -------------------------------------------------------------------------------------------------
+
+ContactView ContactStages::view(const ContactBlock& block, int lane) const {
+  const int a = block.a[lane], b = block.b[lane];
+  ContactView v{a, b, share(a, b), block.proof[lane], &step_.laws[block.law[lane]], {}};
+  block.get(lane, kStateField, kContactStateSize, &v.state);
+  return v;
+}
+
+EnergyLedger ContactStages::stored() const {
+  EnergyLedger sum;
+  for_each_contact([&](const ContactView& c) { sum.add(stored_energy(*c.law, c.state), c.share); });
+  return sum;
+}
+
+std::size_t ContactStages::bytes() const {
+  return pool_.bytes() + sums_.capacity() * sizeof(Accumulator) +
+         a_.capacity() * (2 * sizeof(int) + sizeof(PairProof*) + sizeof(double));
+}
+
+}  // namespace nurbs

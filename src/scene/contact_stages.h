@@ -1,0 +1,172 @@
+// A time step of all contacts of one kind (pairs of bodies, or bodies and a wall), in stages over arrays:
+//   (a) per body, once: scene/bodies.h
+//   (b) budgets: neighbours that cannot have come together since they were proven apart
+//   (c) local models of all contacts          (eight side by side)
+//   (d) solves for the rest: the contact search, one pair at a time
+//   (e) the law                               (eight side by side)
+//   (f) sums of forces, independent of the order of the pairs
+// (c) to (f) go block by block, while a block is in the cache. The host owns the proofs of its neighbours
+// (they travel with its neighbour lists) and hands in who is whose neighbour; the contacts are owned here.
+#pragma once
+
+#include <array>
+#include <string>
+#include <vector>
+
+#include "laws/energy_ledger.h"
+#include "scene/contact_pool.h"
+
+namespace nurbs {
+
+// What came of the pairs in one step, in the order of compute nurbs/stats.
+struct ContactCounts {
+  enum Index {
+    neighbours,
+    safe,
+    bounds,
+    local_model,
+    warm,
+    cold,
+    fallback,
+    contacts,
+    iterations,
+    unresolved,
+    size
+  };
+  std::array<double, size> value{};
+  void add(const ContactResult& result, double weight);
+};
+
+// Contacts at the start of a run that are too deep for a penalty law.
+struct DeepContacts {
+  static constexpr double kDepth = 0.1;  // of the smaller bounding radius
+  double count = 0, deepest = 0;
+};
+
+// Force and torque of one contact, as a host reports it.
+struct ContactView {
+  int a, b;      // bodies; a < 0: the wall
+  double share;  // of the contact that is this rank's: a half where one body is a ghost
+  PairProof* proof;
+  const ContactCoefficients* law;
+  ContactState state;
+};
+
+// Whether a result is a contact.
+inline bool touches(const ContactResult& r) {
+  return r.status != Status::separated && r.gap < 0 && r.normal.squaredNorm() > 0.5;
+}
+
+class ContactStages {
+ public:
+  struct Step {
+    const Bodies* bodies = nullptr;
+    int owned = 0;  // bodies from here on are ghosts: they get no force, and their contacts count half
+    double dt = 0;
+    bool setup = false;   // forces before the first step of a run: nothing may move on
+    bool ledger = false;  // count what is dissipated
+    ContactSettings settings;
+    // Laws by types of bodies: number types[a] * type_count + types[b]; without types number 0.
+    const int* types = nullptr;
+    int type_count = 0;
+    const ContactCoefficients* laws = nullptr;
+    // Partner of neighbours with a < 0: a plane through its x with this normal; free = 0, mass infinite.
+    const BodyRecord* wall = nullptr;
+    Vec3 wall_normal = Vec3::Zero();
+  };
+  struct Unresolved {
+    bool any = false;
+    int a = 0, b = 0;
+    Particle particle_a, particle_b;
+  };
+  struct Sum {
+    Vec3 force, torque;
+    double normal;  // sum of the normal forces
+    bool any;
+  };
+
+  // Who is whose neighbour from now on: begin, a call per pair (a is A of the pair, negative: the wall), end.
+  // Contacts whose proofs do not come again are gone after end. The proofs must stay where they are until
+  // then.
+  void begin_neighbours();
+  void add_neighbour(int a, int b, PairProof* proof) {
+    a_.push_back(a);
+    b_.push_back(b);
+    proofs_.push_back(proof);
+  }
+  void end_neighbours();
+
+  void compute(const Step& step);
+
+  // Sums over the contacts of the last compute: of an owned body, and of the wall (torque about its x).
+  Sum sum(int i) const { return total(sums_[i]); }
+  Sum wall_sum() const { return total(wall_sum_); }
+
+  const ContactCounts& counts() const { return counts_; }
+  const DeepContacts& deep() const { return deep_; }
+  const Unresolved& unresolved() const { return unresolved_; }  // the first of the last compute
+  EnergyLedger& dissipated() { return dissipated_; }
+  const EnergyLedger& dissipated() const { return dissipated_; }
+  EnergyLedger stored() const;
+  ContactPool& pool() { return pool_; }
+  std::size_t bytes() const;
+
+  // Calls visit(ContactView) for every touching contact.
+  template <class Visit>
+  void for_each_contact(Visit visit) const {
+    for (const ContactBlock& block : pool_.blocks())
+      for (int lane = 0; lane < kBlock; ++lane)
+        if ((block.used >> lane & 1) && block.field[kStateField][lane] != 0) visit(view(block, lane));
+  }
+
+ private:
+  struct alignas(64) Accumulator {
+    double high[8], low[8];  // force, torque, normal force, number of contacts; and what was lost of them
+  };
+  struct Results;
+  static Sum total(const Accumulator& s);
+  double share(int a, int b) const { return a < step_.owned && b < step_.owned ? 1 : 0.5; }
+  ContactView view(const ContactBlock& block, int lane) const;
+  const BodyRecord& record(int body) const { return body < 0 ? *step_.wall : step_.bodies->record(body); }
+  double path(int k) const;
+  std::uint64_t stamp_of(int a, int b) const;
+  int law_of(int a, int b) const;
+  Vec3 offset(int a, int b) const;
+  double smaller_radius(int a, int b) const;
+
+  void check_stamps();
+  void check_budgets();
+  double proven(int k) const;
+  void look(int k);
+  ContactResult search(int a, int b, PairMemory& memory);
+  void count(const ContactResult& result, int a, int b);
+
+  void compute_block(ContactBlock& block);
+  void serve(const ContactBlock& block, int first, Results& results) const;
+  void solve_lane(ContactBlock& block, int lane, Results& results);
+  void start_run(ContactBlock& block, int lane, const Results& results);
+  void close(ContactBlock& block, int lane);
+  void release(ContactBlock& block, int lane, double lower);
+  template <bool ledger>
+  void apply_law(ContactBlock& block, int first, const Results& results);
+  void add_load(int body, const double* load);
+
+  // By neighbour: bodies, proof, and the sum of the bodies' paths up to which they are known to be apart;
+  // infinite for those that have a contact.
+  std::vector<int> a_, b_;
+  std::vector<PairProof*> proofs_;
+  std::vector<double> expiry_;
+  bool renewed_ = false;
+
+  ContactPool pool_;
+  std::vector<ContactResult> fresh_;  // results of contacts that stage (b) found
+  LineVector<Accumulator> sums_;
+  Accumulator wall_sum_{};
+  Step step_;
+  ContactCounts counts_;
+  DeepContacts deep_;
+  Unresolved unresolved_;
+  EnergyLedger dissipated_;
+};
+
+}  // namespace nurbs
