@@ -55,7 +55,7 @@ struct Shape {
   std::vector<int> surface_of_patch;   // index into surfaces
   std::vector<std::array<EdgeLink, 4>> links;  // per Bezier patch
   MassProperties mass;
-  Mat3 gyration = Mat3::Zero();            // inertia / mass about the centre of mass, as used in motion
+  Mat3 gyration = Mat3::Zero();  // inertia / mass about the centre of mass, as used in motion
   Mat3 inverse_gyration = Mat3::Zero();
   bool sphere_like = false;                // the principal moments are equal to round-off
   Vec3 principal_gyration = Vec3::Zero();  // its eigenvalues, ascending

@@ -117,6 +117,8 @@ NURBS_INLINE LocalContactOf<Real> evaluate_local(const SupportModelOf<Real>& ma,
   c.point_b = offset + arm_b + support(mb, tb, sb, out_b, turn_of_b, all<Real>(-1), &stray2_b);
   const V between = c.point_b - c.point_a;
   c.gap = dot(d, between);
+  c.point_a =
+      select<Real>(free == 0.0, c.point_b - c.gap * d, c.point_a);  // of a plane, what B's point meets
   const Real angle2_a = dot(turn_of_a, turn_of_a), angle2_b = dot(turn_of_b, turn_of_b);
   const Real second_a = ma.rate * angle2_a, second_b = mb.rate * angle2_b;
   const Real third = second_a * root(angle2_a) + second_b * root(angle2_b);

@@ -223,7 +223,8 @@ NURBS_INLINE void advance_linear(const LinearLawOf<Real>& law, const ContactGeom
   // kn overlap + cn (rate + lag (rest - total c)), clipped at zero.
   const Real rest = select(active, (rate - s.rate) / interval + along * s.normal_force, zero);
   const Real cn = kick * law.cn, spring_force = law.kn * g.overlap;
-  const Real pull = (spring_force + cn * (rate + lag * rest)) / (1.0 + cn * along * lag);
+  const Real damped = (spring_force + cn * (rate + lag * rest)) / (1.0 + cn * along * lag);
+  const Real pull = select(cn == 0.0, spring_force, damped);  // nothing dissipated, to the last bit
   const Real normal_force = larger(pull, zero), damping_force = normal_force - spring_force;
 
   const Carry<Real> carry(old_normal, g.normal);
