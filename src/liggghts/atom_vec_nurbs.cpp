@@ -22,6 +22,8 @@
 namespace LAMMPS_NS {
 
 using nurbs::Quat;
+using nurbs::RotationScheme;
+using nurbs::RotorBatch;
 using nurbs::Vec3;
 
 namespace {
@@ -136,28 +138,61 @@ const nurbs::Bodies& AtomVecNurbs::update_bodies(int immobile) {
 }
 
 Vec3 AtomVecNurbs::principal_inertia(int i) const {
-  return rmass_[i] * scale_[i] * scale_[i] * shape(i)->principal_gyration;
+  return size(i) * shape(i)->principal_gyration;
 }
 
-Vec3 AtomVecNurbs::angular_momentum(int i) const {
-  const Vec3 omega = Vec3::Map(omega_[i]), kept = Vec3::Map(angmom_[i]), inertia = principal_inertia(i);
-  const Quat q = to_quat(quaternion_[i]);
-  const Quat& axes = shape(i)->principal_axes;
-  if (nurbs::angular_velocity(kept, q, axes, inertia) == omega) return kept;
-  return nurbs::angular_momentum(omega, q, axes, inertia);
+Vec3 AtomVecNurbs::momentum_of_spin(int i) const {
+  return nurbs::angular_momentum(Vec3::Map(omega_[i]), to_quat(quaternion_[i]), shape(i)->principal_axes,
+                                 principal_inertia(i));
 }
 
-void AtomVecNurbs::set_angular_momentum(int i, const Vec3& momentum) {
-  Vec3::Map(angmom_[i]) = momentum;
-  Vec3::Map(omega_[i]) = nurbs::angular_velocity(momentum, to_quat(quaternion_[i]), shape(i)->principal_axes,
-                                                 principal_inertia(i));
+void AtomVecNurbs::record_spin(int i) {
+  SpinRecord& made = spin_[i];
+  for (int k = 0; k < 3; ++k) made.omega[k] = omega_[i][k];
+  for (int k = 0; k < 4; ++k) made.q[k] = quaternion_[i][k];
+  made.size = size(i);
 }
 
-void AtomVecNurbs::rotate(int i, nurbs::RotationScheme scheme, const Vec3& momentum, double dt) {
-  Quat q = to_quat(quaternion_[i]);
-  nurbs::rotate_free(scheme, principal_inertia(i), shape(i)->principal_axes, dt, q, momentum);
-  put_quaternion(i, q);
-  set_angular_momentum(i, momentum);
+void AtomVecNurbs::load(const int* list, int count, RotorBatch* batch) const {
+  for (int lane = 0; lane < count; ++lane) {
+    const int i = list[lane];
+    for (int k = 0; k < 4; ++k) batch->q[k][lane] = quaternion_[i][k];
+    for (int k = 0; k < 3; ++k) batch->momentum[k][lane] = angmom_[i][k];
+    batch->inverse_size[lane] = 1 / size(i);
+  }
+}
+
+void AtomVecNurbs::rotate(RotationScheme scheme, const int* list, int count, double dt) {
+  if (scheme != RotationScheme::symplectic) {
+    for (int lane = 0; lane < count; ++lane) {
+      const int i = list[lane];
+      Quat q = to_quat(quaternion_[i]);
+      nurbs::rotate_free(scheme, principal_inertia(i), shape(i)->principal_axes, dt, q, kept_momentum(i));
+      put_quaternion(i, q);
+    }
+    update_omega(list, count);
+    return;
+  }
+  RotorBatch batch;
+  load(list, count, &batch);
+  nurbs::drift(shapes_.rotor(shapetype_[list[0]]), dt, &batch);
+  for (int lane = 0; lane < count; ++lane) {
+    const int i = list[lane];
+    for (int k = 0; k < 4; ++k) quaternion_[i][k] = batch.q[k][lane];
+    for (int k = 0; k < 3; ++k) omega_[i][k] = batch.velocity[k][lane];
+    record_spin(i);
+  }
+}
+
+void AtomVecNurbs::update_omega(const int* list, int count) {
+  RotorBatch batch;
+  load(list, count, &batch);
+  nurbs::find_angular_velocity(shapes_.rotor(shapetype_[list[0]]), &batch);
+  for (int lane = 0; lane < count; ++lane) {
+    const int i = list[lane];
+    for (int k = 0; k < 3; ++k) omega_[i][k] = batch.velocity[k][lane];
+    record_spin(i);
+  }
 }
 
 void AtomVecNurbs::set_body(int i, int shape_number, double scale, double density, const Quat& orientation) {
@@ -166,6 +201,7 @@ void AtomVecNurbs::set_body(int i, int shape_number, double scale, double densit
   density_[i] = density;
   put_quaternion(i, normalised(orientation));
   update_size(i);
+  spin_[i].size = 0;  // the angular momentum kept was another body's
 }
 
 void AtomVecNurbs::put_quaternion(int i, const Quat& q) {
@@ -256,6 +292,7 @@ void AtomVecNurbs::grow(int n) {
   memory->grow(atom->quaternion, nmax, 4, "atom:quaternion");
   memory->grow(atom->shapetype, nmax, "atom:shapetype");
   memory->grow(scale_, nmax, "atom:scale");
+  spin_.resize(nmax);
   grow_reset();
 
   for (int k = 0; k < atom->nextra_grow; ++k) modify->fix[atom->extra_grow[k]]->grow_arrays(nmax);
@@ -357,14 +394,16 @@ double* AtomVecNurbs::get_body(int i, double* p) {
 }
 
 // All that makes a particle; position first, as the host's exchange and read_restart expect. Leaves p[0] to
-// the count.
+// the count. The angular momentum goes along, so that it need not be made from omega again; if omega has been
+// set, it is the momentum of that.
 double* AtomVecNurbs::put_state(int i, double* p) const {
   p = put_position(i, {}, p + 1);
   *p++ = ubuf(tag_[i]).d;
   *p++ = ubuf(type_[i]).d;
   *p++ = ubuf(mask_[i]).d;
   *p++ = ubuf(image_[i]).d;
-  for (int k = 0; k < 3; ++k) *p++ = angmom_[i][k];
+  Vec3::Map(p) = angular_momentum(i);
+  p += kMomentum;
   return put_body(i, put_velocity(i, {}, put_orientation(i, p)));
 }
 
@@ -375,7 +414,9 @@ double* AtomVecNurbs::get_state(int i, double* p) {
   mask_[i] = static_cast<int>(ubuf(*p++).i);
   image_[i] = static_cast<tagint>(ubuf(*p++).i);
   for (int k = 0; k < 3; ++k) angmom_[i][k] = *p++;
-  return get_body(i, get_velocity(i, get_orientation(i, p)));
+  p = get_body(i, get_velocity(i, get_orientation(i, p)));
+  record_spin(i);
+  return p;
 }
 
 int AtomVecNurbs::pack_comm(int n, int* list, double* buf, int pbc_flag, int* pbc) {
@@ -630,7 +671,7 @@ bigint AtomVecNurbs::memory_usage() {
   count("quaternion", quaternion_, nmax, 4);
   count("shapetype", shapetype_, nmax);
   count("scale", scale_, nmax);
-  return bytes;
+  return bytes + static_cast<bigint>(spin_.capacity() * sizeof(SpinRecord));
 }
 
 }  // namespace LAMMPS_NS

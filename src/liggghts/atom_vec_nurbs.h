@@ -17,6 +17,7 @@ AtomStyle(nurbs,AtomVecNurbs)
 #include "contact/contact.h"
 #include "liggghts/shape_library.h"
 #include "motion/rotation.h"
+#include "motion/rotor.h"
 #include "scene/bodies.h"
 
 namespace LAMMPS_NS {
@@ -49,9 +50,22 @@ class AtomVecNurbs : public AtomVec {
   // long as omega is still the one made from it, so that a free particle keeps its momentum to the last bit.
   nurbs::Vec3 angular_momentum(int i) const;
   void set_angular_momentum(int i, const nurbs::Vec3& momentum);
+  int shape_number(int i) const { return shapetype_[i]; }
 
-  // Turns owned particle i for a time dt at constant angular momentum.
-  void rotate(int i, nurbs::RotationScheme scheme, const nurbs::Vec3& momentum, double dt);
+  // Angular momentum of owned particle i about its centre of mass, lab axes. Between steps `omega` is what
+  // counts, so that any command or fix may set it. The momentum it was last made from is kept, and is used as
+  // long as omega, orientation and size are to the last bit what they were then, so that a free particle
+  // keeps its momentum to the last bit.
+  nurbs::Vec3 angular_momentum(int i) const {
+    return spin_is_kept(i) ? kept_momentum(i) : momentum_of_spin(i);
+  }
+
+  // The two halves of a step, after the angular momentum was kept by keep_momentum(i), of owned particles
+  // `list` that share a shape: `count` of them, at most RotorBatch::kBodies. Turns them for a time dt at
+  // constant angular momentum, and sets omega; sets omega alone.
+  void keep_momentum(int i, const nurbs::Vec3& momentum) { nurbs::Vec3::Map(angmom_[i]) = momentum; }
+  void rotate(nurbs::RotationScheme scheme, const int* list, int count, double dt);
+  void update_omega(const int* list, int count);
 
   // Makes particle i a body of this shape, scale, density and orientation (normalised), and sets what follows
   // from them: mass and bounding radius. The values must be valid.
@@ -104,6 +118,17 @@ class AtomVecNurbs : public AtomVec {
   enum class Stage { comm, border };
   ImageShift image_shift(int pbc_flag, const int* pbc, Stage stage) const;
 
+  // What the kept angular momentum made, to see whether it still holds. `size` is 0 when there is none.
+  struct SpinRecord {
+    double omega[3] = {}, q[4] = {}, size = 0;
+  };
+  double size(int i) const { return rmass_[i] * scale_[i] * scale_[i]; }
+  bool spin_is_kept(int i) const;
+  nurbs::Vec3 kept_momentum(int i) const { return nurbs::Vec3::Map(angmom_[i]); }
+  nurbs::Vec3 momentum_of_spin(int i) const;
+  void load(const int* list, int count, nurbs::RotorBatch* batch) const;
+  void record_spin(int i);
+
   void put_quaternion(int i, const nurbs::Quat& q);
   double* put_position(int i, const ImageShift& shift, double* p) const;
   double* put_orientation(int i, double* p) const;
@@ -128,14 +153,23 @@ class AtomVecNurbs : public AtomVec {
   std::vector<const nurbs::Shape*> shape_table_;  // by shape number; [0] is none
   nurbs::Bodies bodies_;
 
-  // The host's arrays (owned by Atom), and the one array Atom has no place for.
+  // The host's arrays (owned by Atom), and the two that Atom has no place for.
   int *tag_ = nullptr, *type_ = nullptr, *mask_ = nullptr, *shapetype_ = nullptr;
   tagint* image_ = nullptr;
   double **x_ = nullptr, **v_ = nullptr, **f_ = nullptr, **omega_ = nullptr, **angmom_ = nullptr,
          **torque_ = nullptr, **quaternion_ = nullptr;
   double *radius_ = nullptr, *density_ = nullptr, *rmass_ = nullptr;
   double* scale_ = nullptr;
+  std::vector<SpinRecord> spin_;
 };
+
+inline bool AtomVecNurbs::spin_is_kept(int i) const {
+  const SpinRecord& made = spin_[i];
+  bool kept = made.size == size(i);
+  for (int k = 0; k < 3; ++k) kept &= made.omega[k] == omega_[i][k];
+  for (int k = 0; k < 4; ++k) kept &= made.q[k] == quaternion_[i][k];
+  return kept;
+}
 
 }  // namespace LAMMPS_NS
 

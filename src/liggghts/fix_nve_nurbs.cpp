@@ -53,30 +53,48 @@ int FixNVENurbs::group_count() const {
   return igroup == atom->firstgroup ? atom->nfirst : atom->nlocal;
 }
 
-// Half a step of force on particle i's velocity.
+// Half a step of force and torque on particle i's velocity and angular momentum; omega does not follow yet.
 void FixNVENurbs::kick(int i) const {
+  auto& bodies = static_cast<AtomVecNurbs&>(*atom->avec);
   Vec3Map(atom->v[i]) += dtf / atom->rmass[i] * Vec3Map(atom->f[i]);
+  bodies.keep_momentum(i, bodies.angular_momentum(i) + dtf * Vec3Map(atom->torque[i]));
+}
+
+// Does each(i) for every particle i of the group and then together(list, count) for all of them, in lists of
+// one shape.
+template <class Each, class Together>
+void FixNVENurbs::sweep(Each each, Together together) {
+  const auto& bodies = static_cast<const AtomVecNurbs&>(*atom->avec);
+  waiting_.resize(bodies.shapes().count());
+  const int n = group_count();
+  for (int i = 0; i < n; ++i) {
+    if (!(atom->mask[i] & groupbit)) continue;
+    each(i);
+    Waiting& waiting = waiting_[bodies.shape_number(i) - 1];
+    waiting.list[waiting.count++] = i;
+    if (waiting.count < nurbs::RotorBatch::kBodies) continue;
+    together(waiting.list, waiting.count);
+    waiting.count = 0;
+  }
+  for (Waiting& waiting : waiting_) {
+    if (waiting.count > 0) together(waiting.list, waiting.count);
+    waiting.count = 0;
+  }
 }
 
 void FixNVENurbs::initial_integrate(int) {
   auto& bodies = static_cast<AtomVecNurbs&>(*atom->avec);
-  const int n = group_count();
-  for (int i = 0; i < n; ++i) {
-    if (!(atom->mask[i] & groupbit)) continue;
-    kick(i);
-    Vec3Map(atom->x[i]) += dtv * Vec3Map(atom->v[i]);
-    bodies.rotate(i, scheme_, bodies.angular_momentum(i) + dtf * Vec3Map(atom->torque[i]), dtv);
-  }
+  sweep(
+      [&](int i) {
+        kick(i);
+        Vec3Map(atom->x[i]) += dtv * Vec3Map(atom->v[i]);
+      },
+      [&](const int* list, int count) { bodies.rotate(scheme_, list, count, dtv); });
 }
 
 void FixNVENurbs::final_integrate() {
   auto& bodies = static_cast<AtomVecNurbs&>(*atom->avec);
-  const int n = group_count();
-  for (int i = 0; i < n; ++i) {
-    if (!(atom->mask[i] & groupbit)) continue;
-    kick(i);
-    bodies.set_angular_momentum(i, bodies.angular_momentum(i) + dtf * Vec3Map(atom->torque[i]));
-  }
+  sweep([&](int i) { kick(i); }, [&](const int* list, int count) { bodies.update_omega(list, count); });
 }
 
 }  // namespace LAMMPS_NS

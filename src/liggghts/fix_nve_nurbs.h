@@ -10,8 +10,11 @@ FixStyle(nve/nurbs,FixNVENurbs)
 #ifndef LMP_FIX_NVE_NURBS_H
 #define LMP_FIX_NVE_NURBS_H
 
+#include <vector>
+
 #include "fix_nve.h"
 #include "motion/rotation.h"
+#include "motion/rotor.h"
 
 namespace LAMMPS_NS {
 
@@ -24,10 +27,19 @@ class FixNVENurbs : public FixNVE {
   void final_integrate() override;
 
  private:
+  // Particles of one shape that wait to be rotated together.
+  struct Waiting {
+    int count = 0;
+    int list[nurbs::RotorBatch::kBodies];
+  };
+
   int group_count() const;
   void kick(int i) const;
+  template <class Each, class Together>
+  void sweep(Each each, Together together);
 
   nurbs::RotationScheme scheme_ = nurbs::RotationScheme::symplectic;
+  std::vector<Waiting> waiting_;  // per shape
 };
 
 }  // namespace LAMMPS_NS

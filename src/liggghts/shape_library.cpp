@@ -79,6 +79,7 @@ void ShapeLibrary::share_sources() {
 
 void ShapeLibrary::build() {
   shapes_.clear();
+  rotors_.clear();
   for (const Source& source : sources_) {
     if (number_of(source.name) != 0)
       nurbs_host::warn(FLERR, lmp,
@@ -95,6 +96,7 @@ void ShapeLibrary::build() {
     }
     for (const std::string& warning : warnings)
       nurbs_host::warn(FLERR, lmp, "Shape file " + source.file + ": " + warning);
+    rotors_.push_back(nurbs::make_rotor(shapes_.back()->principal_gyration, shapes_.back()->principal_axes));
   }
 }
 

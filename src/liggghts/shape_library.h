@@ -8,6 +8,7 @@
 
 #include "body/shape.h"
 #include "lmptype.h"
+#include "motion/rotor.h"
 #include "pointers.h"
 
 namespace LAMMPS_NS {
@@ -30,6 +31,9 @@ class ShapeLibrary : protected Pointers {
   // The shape of this number, 1..count(); not checked.
   const nurbs::Shape* shape(int number) const { return shapes_[number - 1].get(); }
 
+  // The constants of its rotation, per mass and square of scale.
+  const nurbs::Rotor& rotor(int number) const { return rotors_[number - 1]; }
+
   // The number of the first shape of this name, or 0 when there is none.
   int number_of(const std::string& name) const;
 
@@ -46,6 +50,7 @@ class ShapeLibrary : protected Pointers {
 
   std::vector<Source> sources_;
   std::vector<std::shared_ptr<const nurbs::Shape>> shapes_;
+  std::vector<nurbs::Rotor> rotors_;
 };
 
 }  // namespace LAMMPS_NS

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "motion/free_rotor.h"
+#include "motion/rotor.h"
 
 namespace nurbs {
 namespace {
@@ -20,33 +21,7 @@ Quat rotation_by(const Vec3& vector) {
   return turn;
 }
 
-// Index of the intermediate of three values; of equal ones the lowest.
-int intermediate(const Vec3& value) {
-  for (int i = 0; i < 3; ++i) {
-    const double next = value[(i + 1) % 3], last = value[(i + 2) % 3];
-    if ((value[i] - next) * (value[i] - last) <= 0) return i;
-  }
-  return 0;
-}
-
-// Turns by dt along the flow of the energy excess * l_axis^2 / 2: a rotation about one principal axis.
-void turn_about(int axis, double excess, double dt, Quat& q, const Vec3& l_lab) {
-  const Vec3 l = q.conjugate() * l_lab;
-  q = q * rotation_by(excess * l[axis] * dt * Vec3::Unit(axis));
-}
-
-// Here and below q turns principal axes into lab axes.
-void step_symplectic(const Vec3& inertia, double dt, Quat& q, const Vec3& l_lab) {
-  const Vec3 inverse = inertia.cwiseInverse();
-  const int middle = intermediate(inertia);
-  const int first = (middle + 1) % 3, second = (middle + 2) % 3;
-  const Vec3 excess = inverse - Vec3::Constant(inverse[middle]);
-  turn_about(first, excess[first], 0.5 * dt, q, l_lab);
-  turn_about(second, excess[second], dt, q, l_lab);
-  turn_about(first, excess[first], 0.5 * dt, q, l_lab);
-  q = rotation_by(inverse[middle] * dt * l_lab) * q;
-}
-
+// q turns principal axes into lab axes.
 void step_richardson(const Vec3& inertia, double dt, Quat& q, const Vec3& l_lab) {
   const auto turn_in_body = [&](const Quat& at, double time) {
     return rotation_by(time * Vec3((at.conjugate() * l_lab).cwiseQuotient(inertia)));
@@ -61,18 +36,19 @@ void step_richardson(const Vec3& inertia, double dt, Quat& q, const Vec3& l_lab)
 
 void rotate_free(RotationScheme scheme, const Vec3& principal_inertia, const Quat& principal_axes, double dt,
                  Quat& q, const Vec3& angular_momentum) {
-  Quat principal = q * principal_axes;
-  switch (scheme) {
-    case RotationScheme::symplectic:
-      step_symplectic(principal_inertia, dt, principal, angular_momentum);
-      break;
-    case RotationScheme::richardson:
-      step_richardson(principal_inertia, dt, principal, angular_momentum);
-      break;
-    case RotationScheme::exact:
-      advance_free_rotor(principal_inertia, dt, principal, angular_momentum);
-      break;
+  if (scheme == RotationScheme::symplectic) {
+    RotorBatch one;
+    one.set_q(0, q);
+    one.set_momentum(0, angular_momentum);
+    drift(make_rotor(principal_inertia, principal_axes), dt, &one);
+    q = one.get_q(0);
+    return;
   }
+  Quat principal = q * principal_axes;
+  if (scheme == RotationScheme::richardson)
+    step_richardson(principal_inertia, dt, principal, angular_momentum);
+  else
+    advance_free_rotor(principal_inertia, dt, principal, angular_momentum);
   q = principal * principal_axes.conjugate();
   q.normalize();
 }
