@@ -1,0 +1,468 @@
+#!/usr/bin/python3
+"""Times whole steps of beds of particles, at rest and tumbling, side by side, interleaved, on this machine.
+
+    bench/scene.py [--quick] [--only CASE,..] [--n 1000,8000] [--ranks 1,2] [--state rest,tumbling] [--repeats R]
+                   [--seconds S] [--program NAME=PATH ..] [--beds DIR] [--output CSV]
+    bench/scene.py --tolerances [1e-2,1e-4,..] [--only CASE,..] [--output CSV]       cost and observables over `tolerance`
+    bench/scene.py --plot CSV                                                        draws a CSV again
+
+Cases: sphere (the host's own), nurbs-sphere, ellipsoid (1 : 1.5 : 2), pebble, blocky (exponent 4), and, where the
+environment says LIGGGHTS_SUPERQUADRIC=program, superquadric-ellipsoid and superquadric-blocky. All particles have the
+volume of a sphere of 5 mm and the same linear law; the decks are bench/decks/in.*. A bed is a lattice, turned at
+random, dropped into a box of six planes and settled; then the lid comes down to 1.4 times its height. Every shape's bed
+is made once (DIR, default build/scene) and every program starts from it: the sphere's bed is converted to the host's
+spheres, the others' to superquadrics. Each program lets it relax, and saves a restart, from which timed runs begin:
+
+rest      gravity down.
+tumbling  gravity turns about a horizontal axis, once a second, and has turned by 72 degrees when timing begins.
+
+`--program NAME=PATH` times another build of liggghts-nurbs in the same run, in turn with BUILD/liggghts-nurbs; more than
+one may be given. Columns of the CSV:
+
+    program, case, state, n, ranks, tolerance, steps, repeats, us (per particle-step, median; on one rank the share of
+    time without a core is taken off), us_min, us_max, us_wall (median as the host's clock says), pair, neigh, comm,
+    other (shares of the time; walls and motion are `other`), contacts and pairs (per particle, walls included),
+    us_contact (us / contacts), skipped, rejected, local, warm, cold, fallback (shares of the pairs), newton
+    (iterations per contact), unresolved, bytes_host (per particle, as the host prints), bytes_rss (per particle, growth
+    of the process), kinetic (energy at the end per particle / weight x radius), to_sphere (us / host spheres' us),
+    to_superquadric (superquadrics' us / us)
+"""
+import argparse
+import csv
+import hashlib
+import math
+import os
+import pathlib
+import re
+import statistics
+import subprocess
+import sys
+import tempfile
+import time
+
+import numpy as np
+
+ROOT = pathlib.Path(__file__).resolve().parents[1]
+DECKS = ROOT / "bench" / "decks"
+sys.path.insert(0, str(ROOT / "tests" / "decks"))
+import deck  # noqa: E402
+
+RADIUS, DENSITY, GRAVITY, DT = 0.005, 2500.0, 9.81, 5e-5  # dt and the law stand in the decks too
+VOLUME = 4 / 3 * math.pi * RADIUS**3
+RELAX, TURN, WARM = 2000, 4000, 100  # steps: in each program before rest, from there to tumbling, before timing
+TURNS = {"rest": 0, "tumbling": 1}  # of gravity, a second
+
+SHAPES = {  # arguments of nurbs-shape make
+    "sphere": ["sphere"],
+    "ellipsoid": ["ellipsoid", "--axes", "1,1.5,2"],
+    "pebble": ["pebble"],
+    "blocky": ["superellipsoid", "--axes", "1,1,1", "--exponent", "4", "--spans", "5"],
+}
+CASES = {  # name: (deck, shape of the bed)
+    "sphere": ("sphere", "sphere"),
+    "nurbs-sphere": ("nurbs", "sphere"),
+    "ellipsoid": ("nurbs", "ellipsoid"),
+    "pebble": ("nurbs", "pebble"),
+    "blocky": ("nurbs", "blocky"),
+    "superquadric-ellipsoid": ("superquadric", "ellipsoid"),
+    "superquadric-blocky": ("superquadric", "blocky"),
+}
+SUPERQUADRICS = {"ellipsoid": ((1, 1.5, 2), 2), "blocky": ((1, 1, 1), 4)}  # semi-axes, exponent
+STATS = "pairs skipped rejected local warm cold fallback contacts newton unresolved".split()
+COLUMNS = ("program,case,state,n,ranks,tolerance,steps,repeats,us,us_min,us_max,us_wall,pair,neigh,comm,other,contacts,"
+           "pairs,us_contact,skipped,rejected,local,warm,cold,fallback,newton,unresolved,bytes_host,bytes_rss,kinetic,"
+           "to_sphere,to_superquadric").split(",")
+
+
+def number_after(text, label):
+    return float(text.split(label, 1)[1].replace(":", " ").replace(",", " ").split()[0])
+
+
+# --- Runs ------------------------------------------------------------------------------------------------------
+
+
+def peak_memory(pid):
+    """Bytes a process had in memory at most so far; 0 when it has ended. (ru_maxrss remembers who started it.)"""
+    try:
+        status = pathlib.Path(f"/proc/{pid}/status").read_text()
+    except OSError:
+        return 0
+    found = re.search(r"^VmHWM:\s+(\d+) kB", status, re.M)
+    return int(found.group(1)) * 1024 if found else 0
+
+
+class Run:
+    """One run of a deck of bench/decks: log, CPU and wall time, memory. `variables` become -var name value."""
+
+    def __init__(self, program, name, variables, ranks=1):
+        with tempfile.TemporaryDirectory(prefix="nurbs-scene-") as place:
+            command = [str(program), "-in", str(DECKS / f"in.{name}"), "-log", "log.liggghts"]
+            for key, value in {"decks": DECKS, **variables}.items():
+                command += ["-var", key, str(value)]
+            if ranks > 1:
+                command = ["mpirun", "-np", str(ranks)] + command
+            began = time.monotonic()
+            with open(pathlib.Path(place) / "screen", "w+") as screen:
+                process = subprocess.Popen(command, cwd=place, env={**os.environ, **deck.ENVIRONMENT}, stdout=screen,
+                                           stderr=subprocess.STDOUT, stdin=subprocess.DEVNULL)
+                self.rss, ended = 0, 0
+                while not ended:
+                    time.sleep(0.02)
+                    self.rss = peak_memory(process.pid) or self.rss
+                    ended, status, usage = os.wait4(process.pid, os.WNOHANG)
+                process.returncode = os.waitstatus_to_exitcode(status)
+                screen.seek(0)
+                output = screen.read()
+            self.wall = time.monotonic() - began
+            if process.returncode != 0:
+                raise RuntimeError(f"{' '.join(command)}\nfailed:\n{output[-2000:]}")
+            self.log = (pathlib.Path(place) / "log.liggghts").read_text(errors="replace")
+        self.cpu = usage.ru_utime + usage.ru_stime
+        self.tables = deck.thermo_tables(self.log)
+        loop = re.findall(r"^Loop time of (\S+) on (\d+) procs for (\d+) steps with (\d+) atoms", self.log, re.M)[-1]
+        self.seconds, self.steps, self.atoms = float(loop[0]), int(loop[2]), int(loop[3])
+        if "n" in variables and self.atoms != int(variables["n"]):
+            raise RuntimeError(f"{name}: {self.atoms} of {variables['n']} particles left")
+        self.us = self.seconds / (max(self.steps, 1) * self.atoms) * 1e6
+        # Setting up does not count: what waited for a core is taken off the timed loop in proportion.
+        self.us_busy = self.us * min(1.0, self.cpu / self.wall) if ranks == 1 else self.us
+
+    def share(self, name):
+        return float(re.findall(rf"^{name}\s+time \(%\) = \S+ \((\S+)\)", self.log, re.M)[-1]) / 100
+
+    @property
+    def memory(self):
+        return float(re.findall(r"^Memory usage per processor = (\S+) Mbytes", self.log, re.M)[-1]) * 2**20
+
+
+def empty_memory(program):
+    """Bytes of the program before it has a particle."""
+    with tempfile.TemporaryDirectory() as place:
+        process = subprocess.Popen([str(program), "-log", "none"], cwd=place, stdin=subprocess.PIPE,
+                                   stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
+                                   env={**os.environ, **deck.ENVIRONMENT})
+        time.sleep(0.5)
+        most = peak_memory(process.pid)
+        process.communicate(b"")
+    return most
+
+
+# --- Beds ------------------------------------------------------------------------------------------------------
+
+
+def random_quaternions(random, count):
+    q = random.normal(size=(count, 4))
+    return q / np.linalg.norm(q, axis=1, keepdims=True)
+
+
+class Shape:
+    """A shape file, and the scale that gives it the common volume."""
+
+    def __init__(self, name, directory):
+        self.name, self.file = name, directory / f"{name}.json"
+        tool = str(deck.BUILD / "nurbs-shape")
+        if not self.file.exists():
+            subprocess.run([tool, "make", *SHAPES[name], "-o", str(self.file)], check=True, stdout=subprocess.DEVNULL,
+                           stderr=subprocess.DEVNULL)
+        words = subprocess.run([tool, "info", str(self.file)], check=True, capture_output=True, text=True).stdout
+        self.scale = (VOLUME / number_after(words, "volume"))**(1 / 3)
+        self.radius = number_after(words, "bounding radius") * self.scale
+
+
+def lattice(shape, count, width, seed):
+    """Data file of a lattice of particles that don't touch, shifted and turned at random, drifting; and its height."""
+    random = np.random.default_rng(seed)
+    side = int(width / (2.001 * shape.radius))
+    spacing = width / side
+    k = np.arange(count)
+    place = (np.stack([k % side, k // side % side, k // side**2], 1) + 0.5) * spacing
+    place += random.uniform(-0.5, 0.5, (count, 3)) * (spacing - 2 * shape.radius)
+    height = math.ceil(count / side**2) * spacing
+    atoms = [(i + 1, 1, 1, shape.scale, DENSITY, *map(float, (*x, *q)))
+             for i, (x, q) in enumerate(zip(place, random_quaternions(random, count)))]
+    velocities = [(i + 1, *map(float, v), 0.0, 0.0, 0.0) for i, v in enumerate(random.normal(size=(count, 3)) * 0.1)]
+    return deck.data_file(atoms, velocities, ((0.0, width), (0.0, width), (0.0, height))), height
+
+
+def sections(text):
+    """Sections of a data file: {title: rows of words, sorted by id}."""
+    found, rows = {}, None
+    for line in text.splitlines():
+        words = line.split("#")[0].split()
+        if words and words[0] in ("Atoms", "Velocities"):
+            rows = found.setdefault(words[0], [])
+        elif words and rows is not None:
+            rows.append(words)
+    return {title: sorted(rows, key=lambda row: int(row[0])) for title, rows in found.items()}
+
+
+def box_width(count):
+    """Width of the box: a settled bed is about 0.7 times as high."""
+    return (count * VOLUME / 0.62 / 0.7)**(1 / 3)
+
+
+class Bed:
+    """A settled bed of one shape and its conversions, in a directory of its own; made when missing."""
+
+    def __init__(self, shape_name, count, program, directory, ranks=1, seed=7):
+        self.path = pathlib.Path(directory) / f"{shape_name}-{count}"
+        self.count, self.width, self.shape_name = count, box_width(count), shape_name
+        self.path.mkdir(parents=True, exist_ok=True)
+        self.shape = Shape(shape_name, self.path)
+        text, height = lattice(self.shape, count, self.width, seed)
+        self.steps = int(12000 + 6000 * (count / 1000)**(1 / 3))
+        key = hashlib.sha1((text + (DECKS / "in.settle").read_text() + str(self.steps)).encode()).hexdigest()[:10]
+        self.data = self.path / f"bed-{key}.data"
+        if not self.data.exists():
+            print(f"settling {count} x {shape_name} ..", flush=True)
+            (self.path / "lattice.data").write_text(text)
+            fresh = self.path / "fresh.data"
+            run = Run(program, "settle", {"shape": self.shape.file, "lattice": self.path / "lattice.data", "bed": fresh,
+                                          "width": self.width, "height": height, "steps": self.steps,
+                                          "tolerance": 1e-6, "n": count}, ranks)
+            (self.path / "settle.log").write_text(run.log)
+            fresh.rename(self.data)
+        self.key = key
+        self.rows = sections(self.data.read_text())
+        top = max(float(row[7]) for row in self.rows["Atoms"]) + RADIUS
+        self.lid = round(1.4 * top, 4)
+        self.convert()
+
+    def convert(self):
+        """Writes nurbs.data, sphere.data, superquadric.data and turned, in a box up to the lid."""
+        rows = self.rows["Atoms"]
+        limits = ((0.0, self.width), (0.0, self.width), (0.0, self.lid))
+        velocities = self.rows.get("Velocities", [])
+        (self.path / "nurbs.data").write_text(deck.data_file(rows, velocities, limits))
+        if self.shape_name == "sphere":
+            spheres = [(row[0], "1", repr(2 * RADIUS), row[4], *row[5:8]) for row in rows]
+            (self.path / "sphere.data").write_text(deck.data_file(spheres, velocities, limits))
+        if self.shape_name in SUPERQUADRICS:
+            axes, exponent = SUPERQUADRICS[self.shape_name]
+            half = [repr(a * self.shape.scale) for a in axes]
+            bodies = [(row[0], "1", row[4], *half, str(exponent), str(exponent), *row[5:8]) for row in rows]
+            (self.path / "superquadric.data").write_text(deck.data_file(bodies, (), limits))
+            (self.path / "turned").write_text(
+                "".join(f"set atom {row[0]} quat_direct {' '.join(row[8:12])}\n" for row in rows))
+
+    def variables(self, tolerance):
+        return {"shape": self.shape.file, "tolerance": tolerance,
+                "width": self.width, "lid": self.lid, "n": self.count, "start": RELAX}
+
+
+class Job:
+    """One row of the table: a case in a state, on so many ranks, by one program."""
+
+    def __init__(self, name, program, case, state, bed, ranks, tolerance):
+        self.name, self.program, self.case, self.state = name, program, case, state
+        self.kind, self.bed, self.ranks, self.tolerance = CASES[case][0], bed, ranks, tolerance
+        self.runs = []
+
+    def restart(self, state, build_ranks):
+        """Restart of this program in that state; made when missing."""
+        mark = hashlib.sha1(self.program.read_bytes() + (DECKS / f"in.{self.kind}").read_bytes() +
+                            f"{RELAX} {TURN}".encode()).hexdigest()[:10]
+        file = self.bed.path / f"{self.bed.key}-{self.kind}-{mark}-{self.tolerance}-{state}.restart"
+        if not file.exists():
+            earlier = None if state == "rest" else self.restart("rest", build_ranks)
+            print(f"preparing {self.bed.count} x {self.case}, {state}, {self.name} ..", flush=True)
+            fresh = file.with_suffix(".fresh")
+            self.run(earlier, build_ranks, turns=TURNS[state], warm=0, steps=RELAX if state == "rest" else TURN, save=fresh)
+            fresh.rename(file)
+        return file
+
+    def run(self, restart, ranks, turns, warm, steps, save="end.restart", name=None):
+        """Runs from a restart, or from the bed's data file when that is None."""
+        start = {"fresh": 0, "from": restart, "turned": "/dev/null"}
+        if restart is None:
+            start = {"fresh": 1, "from": self.bed.path / f"{self.kind}.data", "turned": self.bed.path / "turned"}
+        return Run(self.program, name or self.kind, {**self.bed.variables(self.tolerance), **start, "turns": turns,
+                                                     "warm": warm, "steps": steps, "save": save}, ranks)
+
+    def time(self, steps, build_ranks):
+        run = self.run(self.restart(self.state, build_ranks), self.ranks, TURNS[self.state], WARM, steps)
+        self.runs.append(run)
+        return run
+
+    def counts(self, build_ranks):
+        """Counts per particle-step, of the NURBS bodies."""
+        run = self.run(self.restart(self.state, build_ranks), self.ranks, TURNS[self.state], 0, 0, name="counts")
+        columns = list(run.tables[-1].values())[1:]
+        return {name: float(np.mean(column[1:])) / self.bed.count for name, column in zip(STATS, columns)}
+
+    def row(self, counts, empty):
+        run = self.runs[-1]
+        us = [r.us_busy for r in self.runs]
+        row = {"program": self.name, "case": self.case, "state": self.state, "n": self.bed.count, "ranks": self.ranks,
+               "tolerance": self.tolerance if self.kind == "nurbs" else "", "steps": run.steps, "repeats": len(us),
+               "us": statistics.median(us), "us_min": min(us), "us_max": max(us),
+               "us_wall": statistics.median(r.us for r in self.runs)}
+        for name, label in (("pair", "Pair"), ("neigh", "Neigh"), ("comm", "Comm"), ("other", "Other")):
+            row[name] = statistics.median(r.share(label) for r in self.runs)
+        if counts:
+            row.update(contacts=counts["contacts"], pairs=counts["pairs"], us_contact=row["us"] / counts["contacts"])
+            if self.kind == "nurbs":
+                row.update({name: counts[name] / max(counts["pairs"], 1e-9)
+                            for name in "skipped rejected local warm cold fallback".split()})
+                row.update(newton=counts["newton"] / max(counts["contacts"], 1e-9),
+                           unresolved=counts["unresolved"] * self.bed.count)
+        row["bytes_host"] = run.memory * self.ranks / self.bed.count
+        if self.ranks == 1:
+            row["bytes_rss"] = (min(r.rss for r in self.runs) - empty) / self.bed.count
+        row["kinetic"] = run.tables[-1]["KinEng"][-1] / (self.bed.count * DENSITY * VOLUME * GRAVITY * RADIUS)
+        return row
+
+
+# --- The table -------------------------------------------------------------------------------------------------
+
+
+def machine_name():
+    for line in open("/proc/cpuinfo"):
+        if line.startswith("model name"):
+            return line.split(":", 1)[1].strip()
+    return "unknown CPU"
+
+
+def programs(options):
+    """Builds of liggghts-nurbs to time, by name; the first one makes the beds and runs the host's spheres."""
+    found = {"nurbs": deck.PROGRAM}
+    for item in options.program:
+        name, _, path = item.partition("=")
+        if not path:
+            sys.exit(f"--program {item}: give NAME=PATH")
+        found[name] = pathlib.Path(path).resolve()
+    return found
+
+
+def superquadric_program():
+    path = os.environ.get("LIGGGHTS_SUPERQUADRIC")
+    return pathlib.Path(path).resolve() if path else None
+
+
+def steps_for(case, state, count, seconds):
+    """About `seconds` of 2 us per particle-step; host spheres, which are faster, get more steps where steps are alike."""
+    steps = max(100, round(seconds * 1e6 / (2 * count)))
+    return steps * 6 if case == "sphere" and state == "rest" else steps
+
+
+def jobs_of(options):
+    superquadric, builds, jobs, beds = superquadric_program(), programs(options), [], {}
+    for count in options.n:
+        ranks_to_build = 1 if count < 4000 else min(2, os.cpu_count() or 1)
+        for case in options.only:
+            kind, shape = CASES[case]
+            if kind == "superquadric" and superquadric is None:
+                continue
+            if (shape, count) not in beds:
+                beds[shape, count] = Bed(shape, count, next(iter(builds.values())), options.beds, ranks_to_build)
+            for state in options.state:
+                for ranks in options.ranks:
+                    chosen = {"superquadric": {"superquadric": superquadric}, "nurbs": builds,
+                              "sphere": {"host": next(iter(builds.values()))}}[kind]
+                    jobs += [Job(name, path, case, state, beds[shape, count], ranks, options.tolerance)
+                             for name, path in chosen.items()]
+    return jobs
+
+
+def add_ratios(rows):
+    """Ratios within the run: to host spheres, and of superquadrics to ours."""
+    us = {(row["case"], row["state"], row["n"], row["ranks"]): row["us"] for row in rows}
+    for row in rows:
+        same = (row["state"], row["n"], row["ranks"])
+        if ("sphere", ) + same in us:
+            row["to_sphere"] = row["us"] / us[("sphere", ) + same]
+        if ("superquadric-" + row["case"], ) + same in us:
+            row["to_superquadric"] = us[("superquadric-" + row["case"], ) + same] / row["us"]
+
+
+def write(rows, columns, file, note):
+    file.parent.mkdir(parents=True, exist_ok=True)
+    with open(file, "w", newline="") as stream:
+        stream.write(f"# {machine_name()}, {os.cpu_count()} cores; {note}\n")
+        writer = csv.DictWriter(stream, columns, restval="")
+        writer.writeheader()
+        writer.writerows({k: f"{v:.6g}" if isinstance(v, float) else v for k, v in row.items()} for row in rows)
+
+
+def show(rows):
+    print(f"{'program':13}{'case':23}{'state':9}{'n':>6} r    us  (min)   per contact  pair neigh comm other  "
+          "contacts local warm cold  B/particle  kinetic   /sphere  superq/", flush=True)
+    for row in rows:
+        number = lambda key, form: format(row[key], form) if row.get(key, "") != "" else "-"  # noqa: E731
+        print(f"{row['program']:13}{row['case']:23}{row['state']:9}{row['n']:6} {row['ranks']} {row['us']:6.3f} "
+              f"({row['us_min']:.3f}) {number('us_contact', '8.3f'):>8}     {row['pair']:6.2f}{row['neigh']:6.2f}"
+              f"{row['comm']:5.2f}{row['other']:6.2f}  {number('contacts', '6.2f'):>8} {number('local', '5.3f'):>5}"
+              f"{number('warm', '5.2f'):>5}{number('cold', '5.2f'):>5} {number('bytes_rss', '8.0f'):>9}"
+              f"  {row['kinetic']:8.1e} {number('to_sphere', '7.2f'):>8} {number('to_superquadric', '7.2f'):>8}")
+
+
+def table(options):
+    jobs = jobs_of(options)
+    builders = {job: 1 if job.bed.count < 4000 else min(2, os.cpu_count() or 1) for job in jobs}
+    for job in jobs:
+        job.restart(job.state, builders[job])
+    counts = {}  # by bed, state: superquadrics and host spheres lie in the same bed
+    for job in jobs:
+        shape = CASES[job.case][1]
+        if job.kind == "nurbs":
+            here = job.counts(builders[job])
+            counts[job] = here
+            counts.setdefault((shape, job.state, job.bed.count), here)
+    empty = {program: empty_memory(program) for program in {job.program for job in jobs}}
+    for repeat in range(options.repeats):
+        for job in jobs:
+            run = job.time(steps_for(job.case, job.state, job.bed.count, options.seconds), builders[job])
+            print(f"{repeat + 1}/{options.repeats} {job.name} {job.case} {job.state} {job.bed.count} {job.ranks}: "
+                  f"{run.us_busy:.3f} us", flush=True)
+        rows = [job.row(counts.get(job) or counts.get((CASES[job.case][1], job.state, job.bed.count)), empty[job.program])
+                for job in jobs]
+        add_ratios(rows)
+        write(rows, COLUMNS, options.output, f"median of {repeat + 1} interleaved runs")
+    show(rows)
+    draw_table(options.output)
+
+
+def arguments():
+    parser = argparse.ArgumentParser(description=__doc__.split("\n", 1)[0])
+    words = lambda text: text.split(",")  # noqa: E731
+    parser.add_argument("--quick", action="store_true", help="1,000 particles, one rank, spheres and ellipsoids")
+    parser.add_argument("--only", type=words, help="cases: " + ", ".join(CASES))
+    parser.add_argument("--n", type=lambda text: [int(w) for w in words(text)])
+    parser.add_argument("--ranks", type=lambda text: [int(w) for w in words(text)])
+    parser.add_argument("--state", type=words, default=list(TURNS))
+    parser.add_argument("--repeats", type=int)
+    parser.add_argument("--seconds", type=float, help="of a timed run, about (for 2 us per particle-step)")
+    parser.add_argument("--tolerance", default="1e-9")
+    parser.add_argument("--program", action="append", default=[], metavar="NAME=PATH")
+    parser.add_argument("--beds", type=pathlib.Path, default=deck.BUILD / "scene")
+    parser.add_argument("--output", type=pathlib.Path)
+    parser.add_argument("--plot", type=pathlib.Path, metavar="CSV")
+    options = parser.parse_args()
+    quick = options.quick
+    options.only = options.only or (["sphere", "ellipsoid", "superquadric-ellipsoid"] if quick else list(CASES))
+    options.n = options.n or ([1000] if quick else [1000, 8000])
+    options.ranks = options.ranks or ([1] if quick else [1, 2])
+    options.repeats = options.repeats or (3 if quick else 5)
+    options.seconds = options.seconds or (1.0 if quick else 4.0)
+    options.beds = options.beds.resolve()
+    options.output = options.output or deck.BUILD / "scene" / "scene.csv"
+    for case in options.only:
+        if case not in CASES:
+            parser.error(f"unknown case {case}; there are {', '.join(CASES)}")
+    return options
+
+
+def draw_table(file):
+    pass
+
+
+def main():
+    options = arguments()
+    if options.plot:
+        draw_table(options.plot)
+    else:
+        table(options)
+
+
+if __name__ == "__main__":
+    main()
