@@ -3,8 +3,10 @@
 
     bench/scene.py [--quick] [--only CASE,..] [--n 1000,8000] [--ranks 1,2] [--state rest,tumbling] [--repeats R]
                    [--seconds S] [--program NAME=PATH ..] [--beds DIR] [--output CSV]
-    bench/scene.py --tolerances [1e-2,1e-4,..] [--only CASE,..] [--output CSV]       cost and observables over `tolerance`
-    bench/scene.py --plot CSV                                                        draws a CSV again
+    bench/scene.py --tolerances [1e-2,1e-4,..] [--only CASE,..] [--output CSV]    cost and observables over `tolerance`
+    bench/scene.py --plot CSV                                                     draws a CSV again
+
+A picture is drawn beside the CSV (default: scene.csv or scene_tolerance.csv in BUILD/scene).
 
 Cases: sphere (the host's own), nurbs-sphere, ellipsoid (1 : 1.5 : 2), pebble, blocky (exponent 4), and, where the
 environment says LIGGGHTS_SUPERQUADRIC=program, superquadric-ellipsoid and superquadric-blocky. All particles have the
@@ -16,8 +18,8 @@ spheres, the others' to superquadrics. Each program lets it relax, and saves a r
 rest      gravity down.
 tumbling  gravity turns about a horizontal axis, once a second, and has turned by 72 degrees when timing begins.
 
-`--program NAME=PATH` times another build of liggghts-nurbs in the same run, in turn with BUILD/liggghts-nurbs; more than
-one may be given. Columns of the CSV:
+`--program NAME=PATH` times another build of liggghts-nurbs in the same run, in turn with BUILD/liggghts-nurbs; more
+than one may be given. Columns of the CSV:
 
     program, case, state, n, ranks, tolerance, steps, repeats, us (per particle-step, median; on one rank the share of
     time without a core is taken off), us_min, us_max, us_wall (median as the host's clock says), pair, neigh, comm,
@@ -25,7 +27,13 @@ one may be given. Columns of the CSV:
     us_contact (us / contacts), skipped, rejected, local, warm, cold, fallback (shares of the pairs), newton
     (iterations per contact), unresolved, bytes_host (per particle, as the host prints), bytes_rss (per particle, growth
     of the process), kinetic (energy at the end per particle / weight x radius), to_sphere (us / host spheres' us),
-    to_superquadric (superquadrics' us / us)
+    to_superquadric (superquadrics' us / us), both the median of the ratios inside each round of runs
+
+`--tolerances` times the bed of 1,000 as above for each tolerance, and drops small beds (216 particles, three seeds,
+from the lattice to rest) under it, of which the CSV has mean and standard deviation:
+
+    case, tolerance, us_rest, us_tumbling, packing (volume of the particles / (floor x twice their mean height)),
+    contacts (per particle at rest), ledger (largest |energy + dissipated - first| / energy lost), kinetic, unresolved
 """
 import argparse
 import csv
@@ -72,6 +80,11 @@ STATS = "pairs skipped rejected local warm cold fallback contacts newton unresol
 COLUMNS = ("program,case,state,n,ranks,tolerance,steps,repeats,us,us_min,us_max,us_wall,pair,neigh,comm,other,contacts,"
            "pairs,us_contact,skipped,rejected,local,warm,cold,fallback,newton,unresolved,bytes_host,bytes_rss,kinetic,"
            "to_sphere,to_superquadric").split(",")
+
+
+TOLERANCE_COLUMNS = ("case,tolerance,us_rest,us_tumbling,packing,packing_sd,contacts,contacts_sd,ledger,ledger_sd,"
+                     "kinetic,unresolved").split(",")
+DROPPED, SEEDS = 216, 3
 
 
 def number_after(text, label):
@@ -204,7 +217,7 @@ def box_width(count):
 class Bed:
     """A settled bed of one shape and its conversions, in a directory of its own; made when missing."""
 
-    def __init__(self, shape_name, count, program, directory, ranks=1, seed=7):
+    def __init__(self, shape_name, count, program, directory, seed=7):
         self.path = pathlib.Path(directory) / f"{shape_name}-{count}"
         self.count, self.width, self.shape_name = count, box_width(count), shape_name
         self.path.mkdir(parents=True, exist_ok=True)
@@ -219,7 +232,7 @@ class Bed:
             fresh = self.path / "fresh.data"
             run = Run(program, "settle", {"shape": self.shape.file, "lattice": self.path / "lattice.data", "bed": fresh,
                                           "width": self.width, "height": height, "steps": self.steps,
-                                          "tolerance": 1e-6, "n": count}, ranks)
+                                          "tolerance": 1e-6, "n": count}, build_ranks(count))
             (self.path / "settle.log").write_text(run.log)
             fresh.rename(self.data)
         self.key = key
@@ -258,16 +271,16 @@ class Job:
         self.kind, self.bed, self.ranks, self.tolerance = CASES[case][0], bed, ranks, tolerance
         self.runs = []
 
-    def restart(self, state, build_ranks):
+    def restart(self, state):
         """Restart of this program in that state; made when missing."""
         mark = hashlib.sha1(self.program.read_bytes() + (DECKS / f"in.{self.kind}").read_bytes() +
                             f"{RELAX} {TURN}".encode()).hexdigest()[:10]
         file = self.bed.path / f"{self.bed.key}-{self.kind}-{mark}-{self.tolerance}-{state}.restart"
         if not file.exists():
-            earlier = None if state == "rest" else self.restart("rest", build_ranks)
+            earlier = None if state == "rest" else self.restart("rest")
             print(f"preparing {self.bed.count} x {self.case}, {state}, {self.name} ..", flush=True)
             fresh = file.with_suffix(".fresh")
-            self.run(earlier, build_ranks, turns=TURNS[state], warm=0, steps=RELAX if state == "rest" else TURN, save=fresh)
+            self.run(earlier, build_ranks(self.bed.count), TURNS[state], 0, RELAX if state == "rest" else TURN, fresh)
             fresh.rename(file)
         return file
 
@@ -279,14 +292,14 @@ class Job:
         return Run(self.program, name or self.kind, {**self.bed.variables(self.tolerance), **start, "turns": turns,
                                                      "warm": warm, "steps": steps, "save": save}, ranks)
 
-    def time(self, steps, build_ranks):
-        run = self.run(self.restart(self.state, build_ranks), self.ranks, TURNS[self.state], WARM, steps)
+    def time(self, steps):
+        run = self.run(self.restart(self.state), self.ranks, TURNS[self.state], WARM, steps)
         self.runs.append(run)
         return run
 
-    def counts(self, build_ranks):
+    def counts(self):
         """Counts per particle-step, of the NURBS bodies."""
-        run = self.run(self.restart(self.state, build_ranks), self.ranks, TURNS[self.state], 0, 0, name="counts")
+        run = self.run(self.restart(self.state), self.ranks, TURNS[self.state], 0, 0, name="counts")
         columns = list(run.tables[-1].values())[1:]
         return {name: float(np.mean(column[1:])) / self.bed.count for name, column in zip(STATS, columns)}
 
@@ -340,21 +353,25 @@ def superquadric_program():
 
 
 def steps_for(case, state, count, seconds):
-    """About `seconds` of 2 us per particle-step; host spheres, which are faster, get more steps where steps are alike."""
+    """About `seconds` of 2 us per particle-step; host spheres, which are faster, get more where steps are alike."""
     steps = max(100, round(seconds * 1e6 / (2 * count)))
     return steps * 6 if case == "sphere" and state == "rest" else steps
+
+
+def build_ranks(count):
+    """Big beds are made on two ranks."""
+    return 1 if count < 4000 else min(2, os.cpu_count() or 1)
 
 
 def jobs_of(options):
     superquadric, builds, jobs, beds = superquadric_program(), programs(options), [], {}
     for count in options.n:
-        ranks_to_build = 1 if count < 4000 else min(2, os.cpu_count() or 1)
         for case in options.only:
             kind, shape = CASES[case]
             if kind == "superquadric" and superquadric is None:
                 continue
             if (shape, count) not in beds:
-                beds[shape, count] = Bed(shape, count, next(iter(builds.values())), options.beds, ranks_to_build)
+                beds[shape, count] = Bed(shape, count, next(iter(builds.values())), options.beds)
             for state in options.state:
                 for ranks in options.ranks:
                     chosen = {"superquadric": {"superquadric": superquadric}, "nurbs": builds,
@@ -364,15 +381,16 @@ def jobs_of(options):
     return jobs
 
 
-def add_ratios(rows):
-    """Ratios within the run: to host spheres, and of superquadrics to ours."""
-    us = {(row["case"], row["state"], row["n"], row["ranks"]): row["us"] for row in rows}
-    for row in rows:
-        same = (row["state"], row["n"], row["ranks"])
-        if ("sphere", ) + same in us:
-            row["to_sphere"] = row["us"] / us[("sphere", ) + same]
-        if ("superquadric-" + row["case"], ) + same in us:
-            row["to_superquadric"] = us[("superquadric-" + row["case"], ) + same] / row["us"]
+def add_ratios(jobs, rows):
+    """Ratios within the run: to host spheres, and of superquadrics to ours; round by round, then the median."""
+    runs = {(job.case, job.state, job.bed.count, job.ranks): job.runs for job in jobs}
+    for job, row in zip(jobs, rows):
+        same = (job.state, job.bed.count, job.ranks)
+        for column, case in (("to_sphere", "sphere"), ("to_superquadric", "superquadric-" + job.case)):
+            other = runs.get((case, ) + same, [])
+            ratios = [mine.us_busy / theirs.us_busy for mine, theirs in zip(job.runs, other)]
+            if ratios:
+                row[column] = statistics.median(ratios) if case == "sphere" else 1 / statistics.median(ratios)
 
 
 def write(rows, columns, file, note):
@@ -398,25 +416,24 @@ def show(rows):
 
 def table(options):
     jobs = jobs_of(options)
-    builders = {job: 1 if job.bed.count < 4000 else min(2, os.cpu_count() or 1) for job in jobs}
     for job in jobs:
-        job.restart(job.state, builders[job])
+        job.restart(job.state)
     counts = {}  # by bed, state: superquadrics and host spheres lie in the same bed
     for job in jobs:
         shape = CASES[job.case][1]
         if job.kind == "nurbs":
-            here = job.counts(builders[job])
+            here = job.counts()
             counts[job] = here
             counts.setdefault((shape, job.state, job.bed.count), here)
     empty = {program: empty_memory(program) for program in {job.program for job in jobs}}
     for repeat in range(options.repeats):
         for job in jobs:
-            run = job.time(steps_for(job.case, job.state, job.bed.count, options.seconds), builders[job])
+            run = job.time(steps_for(job.case, job.state, job.bed.count, options.seconds))
             print(f"{repeat + 1}/{options.repeats} {job.name} {job.case} {job.state} {job.bed.count} {job.ranks}: "
                   f"{run.us_busy:.3f} us", flush=True)
-        rows = [job.row(counts.get(job) or counts.get((CASES[job.case][1], job.state, job.bed.count)), empty[job.program])
-                for job in jobs]
-        add_ratios(rows)
+        shared = [counts.get(job) or counts.get((CASES[job.case][1], job.state, job.bed.count)) for job in jobs]
+        rows = [job.row(here, empty[job.program]) for job, here in zip(jobs, shared)]
+        add_ratios(jobs, rows)
         write(rows, COLUMNS, options.output, f"median of {repeat + 1} interleaved runs")
     show(rows)
     draw_table(options.output)
@@ -433,33 +450,157 @@ def arguments():
     parser.add_argument("--repeats", type=int)
     parser.add_argument("--seconds", type=float, help="of a timed run, about (for 2 us per particle-step)")
     parser.add_argument("--tolerance", default="1e-9")
+    parser.add_argument("--tolerances", type=words, nargs="?", const=[f"1e-{k}" for k in range(2, 13, 2)])
     parser.add_argument("--program", action="append", default=[], metavar="NAME=PATH")
     parser.add_argument("--beds", type=pathlib.Path, default=deck.BUILD / "scene")
     parser.add_argument("--output", type=pathlib.Path)
     parser.add_argument("--plot", type=pathlib.Path, metavar="CSV")
     options = parser.parse_args()
     quick = options.quick
-    options.only = options.only or (["sphere", "ellipsoid", "superquadric-ellipsoid"] if quick else list(CASES))
+    default = ["ellipsoid", "blocky"] if options.tolerances else list(CASES)
+    options.only = options.only or (["sphere", "ellipsoid", "superquadric-ellipsoid"] if quick else default)
     options.n = options.n or ([1000] if quick else [1000, 8000])
     options.ranks = options.ranks or ([1] if quick else [1, 2])
     options.repeats = options.repeats or (3 if quick else 5)
     options.seconds = options.seconds or (1.0 if quick else 4.0)
     options.beds = options.beds.resolve()
-    options.output = options.output or deck.BUILD / "scene" / "scene.csv"
+    name = "scene_tolerance.csv" if options.tolerances else "scene.csv"
+    options.output = options.output or deck.BUILD / "scene" / name
     for case in options.only:
         if case not in CASES:
             parser.error(f"unknown case {case}; there are {', '.join(CASES)}")
     return options
 
 
+# --- Cost and observables over the tolerance -------------------------------------------------------------------
+
+
+def drop(program, shape, tolerance, seed, place):
+    """A small bed from lattice to rest: (packing, contacts, ledger residual, kinetic energy, unresolved)."""
+    width = box_width(DROPPED)
+    text, height = lattice(shape, DROPPED, width, seed)
+    (place / "lattice.data").write_text(text)
+    run = Run(program, "settle", {"shape": shape.file, "lattice": place / "lattice.data", "bed": place / "settled.data",
+                                  "width": width, "height": height, "steps": 14000, "tolerance": tolerance,
+                                  "n": DROPPED})
+    table = np.array(list(run.tables[-1].values()))
+    kinetic, weight, total = table[1] + table[2], table[3], table[1:8].sum(0)
+    middle = np.mean([float(row[7]) for row in sections((place / "settled.data").read_text())["Atoms"]])
+    return (DROPPED * VOLUME / (width**2 * 2 * middle), table[8, -1] / DROPPED,
+            abs(total - total[0]).max() / (weight[0] - weight[-1]),
+            kinetic[-1] / (DROPPED * DENSITY * VOLUME * GRAVITY * RADIUS), table[9].max())
+
+
+def tolerance_table(options):
+    program, jobs, dropped = deck.PROGRAM, {}, {}
+    cases = [case for case in options.only if CASES[case][0] == "nurbs"]
+    for case in cases:
+        bed = Bed(CASES[case][1], 1000, program, options.beds)
+        for tolerance in options.tolerances:
+            with tempfile.TemporaryDirectory() as place:
+                dropped[case, tolerance] = np.array([drop(program, bed.shape, tolerance, seed, pathlib.Path(place))
+                                                     for seed in range(1, SEEDS + 1)])
+            print(f"{case} {tolerance}: packing, contacts, ledger, kinetic, unresolved",
+                  dropped[case, tolerance].mean(0), flush=True)
+            for state in TURNS:
+                jobs[case, tolerance, state] = Job("nurbs", program, case, state, bed, 1, tolerance)
+                jobs[case, tolerance, state].restart(state)
+    for _ in range(options.repeats):
+        for (case, tolerance, state), job in jobs.items():
+            job.time(steps_for(case, state, 1000, options.seconds))
+    rows = []
+    for case in cases:
+        for tolerance in options.tolerances:
+            drops = dropped[case, tolerance]
+            mean, spread = drops.mean(0), drops.std(0, ddof=1)
+            us = [statistics.median(run.us_busy for run in jobs[case, tolerance, state].runs) for state in TURNS]
+            values = (case, tolerance, *us, mean[0], spread[0], mean[1], spread[1], mean[2], spread[2], mean[3],
+                      drops[:, 4].max())
+            rows.append(dict(zip(TOLERANCE_COLUMNS, values)))
+            print({k: f"{v:.4g}" if isinstance(v, float) else v for k, v in rows[-1].items()}, flush=True)
+    write(rows, TOLERANCE_COLUMNS, options.output, f"costs: median of {options.repeats} interleaved runs")
+    draw_tolerances(options.output)
+
+
+# --- Pictures --------------------------------------------------------------------------------------------------
+
+
+def read(file):
+    with open(file, newline="") as stream:
+        note = stream.readline().lstrip("# ").strip()
+        return note, list(csv.DictReader(stream))
+
+
+def pyplot():
+    import matplotlib
+    matplotlib.use("Agg")
+    import matplotlib.pyplot as plt
+    return plt
+
+
 def draw_table(file):
-    pass
+    """Bars: time of a particle-step by case, split into its shares; a panel for each state and number of ranks."""
+    plt = pyplot()
+    note, rows = read(file)
+    states, ranks = (sorted({row[key] for row in rows}) for key in ("state", "ranks"))
+    counts = sorted({int(row["n"]) for row in rows})
+    builds = {row["program"] for row in rows} - {"host", "superquadric"}
+    label = lambda row: row["case"] if len(builds) < 2 or row["program"] not in builds else (  # noqa: E731
+        f"{row['case']} [{row['program']}]")
+    labels = list(dict.fromkeys(label(row) for row in rows))
+    figure, axes = plt.subplots(len(states), len(ranks), squeeze=False, sharex=True, constrained_layout=True,
+                                figsize=(max(5, 1 + 0.9 * len(labels)) * len(ranks), 4.2 * len(states)))
+    colours = {"pair": "tab:blue", "neigh": "tab:orange", "comm": "tab:green", "other": "tab:grey"}
+    for axis, (state, rank) in zip(axes.flat, ((s, r) for s in states for r in ranks)):
+        for row in (row for row in rows if (row["state"], row["ranks"]) == (state, rank)):
+            width = 0.8 / len(counts)
+            x = labels.index(label(row)) - 0.4 + width * (counts.index(int(row["n"])) + 0.5)
+            bottom, us = 0.0, float(row["us"])
+            for part, colour in colours.items():
+                share = us * float(row[part])
+                axis.bar(x, share, width * 0.92, bottom, color=colour, alpha=1 - 0.25 * counts.index(int(row["n"])))
+                bottom += share
+            axis.annotate(f"{us:.2f}", (x, us), ha="center", va="bottom", fontsize=7)
+        axis.set_xticks(range(len(labels)), labels, rotation=35, ha="right", fontsize=8)
+        axis.set(title=f"{state}, {rank} rank{'s' if rank != '1' else ''}", ylabel="µs per particle-step")
+        axis.grid(axis="y", alpha=0.3)
+    marks = [plt.Rectangle((0, 0), 1, 1, color=colour) for colour in colours.values()]
+    axes.flat[0].legend(marks, colours, fontsize=8)
+    figure.suptitle(f"Bars of a group: {', '.join(f'{n:,}' for n in counts)} particles. {note}", fontsize=9)
+    figure.savefig(pathlib.Path(file).with_suffix(".png"), dpi=110)
+
+
+def draw_tolerances(file):
+    plt = pyplot()
+    note, rows = read(file)
+    figure, axes = plt.subplots(1, 4, figsize=(17, 4.2), constrained_layout=True)
+    for case, colour in zip(dict.fromkeys(row["case"] for row in rows), ("tab:blue", "tab:red", "tab:green", "k")):
+        mine = [row for row in rows if row["case"] == case]
+        column = lambda name: np.array([float(row[name]) for row in mine])  # noqa: E731
+        x = column("tolerance")
+        axes[0].semilogx(x, column("us_rest"), "o-", color=colour, label=f"{case}, rest")
+        axes[0].semilogx(x, column("us_tumbling"), "s--", color=colour, label=f"{case}, tumbling")
+        axes[1].errorbar(x, column("packing"), column("packing_sd"), fmt="o-", color=colour, capsize=3, label=case)
+        axes[2].errorbar(x, column("contacts"), column("contacts_sd"), fmt="o-", color=colour, capsize=3, label=case)
+        axes[3].loglog(x, column("ledger"), "o-", color=colour, label=case)
+    titles = ("µs per particle-step", "packing fraction (3 drops)", "contacts per particle (3 drops)",
+              "energy ledger: error / energy lost")
+    for axis, title in zip(axes, titles):
+        axis.set(title=title, xlabel="tolerance", xscale="log")
+        axis.invert_xaxis()
+        axis.grid(alpha=0.3)
+        axis.legend(fontsize=8)
+    axes[0].set_ylim(bottom=0)
+    figure.suptitle(note, fontsize=9)
+    figure.savefig(pathlib.Path(file).with_suffix(".png"), dpi=110)
 
 
 def main():
     options = arguments()
     if options.plot:
-        draw_table(options.plot)
+        (draw_tolerances if "tolerance" in options.plot.name else draw_table)(options.plot)
+    elif options.tolerances:
+        tolerance_table(options)
     else:
         table(options)
 
