@@ -57,7 +57,7 @@ import deck  # noqa: E402
 
 RADIUS, DENSITY, GRAVITY, DT = 0.005, 2500.0, 9.81, 5e-5  # dt and the law stand in the decks too
 VOLUME = 4 / 3 * math.pi * RADIUS**3
-RELAX, TURN, WARM = 2000, 4000, 100  # steps: in each program before rest, from there to tumbling, before timing
+SETTLE, RELAX, TURN, WARM = 15000, 2000, 4000, 100  # steps: of the drop; to rest, then to tumbling; before timing
 TURNS = {"rest": 0, "tumbling": 1}  # of gravity, a second
 
 SHAPES = {  # arguments of nurbs-shape make
@@ -97,15 +97,23 @@ def number_after(text, label):
 def peak_memory(pid):
     """Bytes a process had in memory at most so far; 0 when it has ended. (ru_maxrss remembers who started it.)"""
     try:
-        status = pathlib.Path(f"/proc/{pid}/status").read_text()
+        found = re.search(r"^VmHWM:\s+(\d+) kB", pathlib.Path(f"/proc/{pid}/status").read_text(), re.M)
     except OSError:
         return 0
-    found = re.search(r"^VmHWM:\s+(\d+) kB", status, re.M)
     return int(found.group(1)) * 1024 if found else 0
 
 
+def share_of_core(pid):
+    """Of the time its main thread wanted a core, the share in which it had one; None when it has ended."""
+    try:
+        on_core, waited = map(int, pathlib.Path(f"/proc/{pid}/schedstat").read_text().split()[:2])
+    except (OSError, ValueError):
+        return None
+    return on_core / (on_core + waited) if on_core else None
+
+
 class Run:
-    """One run of a deck of bench/decks: log, CPU and wall time, memory. `variables` become -var name value."""
+    """One run of a deck of bench/decks: log, time, memory. `variables` become -var name value."""
 
     def __init__(self, program, name, variables, ranks=1):
         with tempfile.TemporaryDirectory(prefix="nurbs-scene-") as place:
@@ -114,31 +122,26 @@ class Run:
                 command += ["-var", key, str(value)]
             if ranks > 1:
                 command = ["mpirun", "-np", str(ranks)] + command
-            began = time.monotonic()
             with open(pathlib.Path(place) / "screen", "w+") as screen:
                 process = subprocess.Popen(command, cwd=place, env={**os.environ, **deck.ENVIRONMENT}, stdout=screen,
                                            stderr=subprocess.STDOUT, stdin=subprocess.DEVNULL)
-                self.rss, ended = 0, 0
-                while not ended:
+                self.rss, core = 0, 1.0
+                while process.poll() is None:
                     time.sleep(0.02)
                     self.rss = peak_memory(process.pid) or self.rss
-                    ended, status, usage = os.wait4(process.pid, os.WNOHANG)
-                process.returncode = os.waitstatus_to_exitcode(status)
+                    core = share_of_core(process.pid) or core
                 screen.seek(0)
                 output = screen.read()
-            self.wall = time.monotonic() - began
             if process.returncode != 0:
                 raise RuntimeError(f"{' '.join(command)}\nfailed:\n{output[-2000:]}")
             self.log = (pathlib.Path(place) / "log.liggghts").read_text(errors="replace")
-        self.cpu = usage.ru_utime + usage.ru_stime
         self.tables = deck.thermo_tables(self.log)
         loop = re.findall(r"^Loop time of (\S+) on (\d+) procs for (\d+) steps with (\d+) atoms", self.log, re.M)[-1]
         self.seconds, self.steps, self.atoms = float(loop[0]), int(loop[2]), int(loop[3])
         if "n" in variables and self.atoms != int(variables["n"]):
             raise RuntimeError(f"{name}: {self.atoms} of {variables['n']} particles left")
         self.us = self.seconds / (max(self.steps, 1) * self.atoms) * 1e6
-        # Setting up does not count: what waited for a core is taken off the timed loop in proportion.
-        self.us_busy = self.us * min(1.0, self.cpu / self.wall) if ranks == 1 else self.us
+        self.us_busy = self.us * core if ranks == 1 else self.us  # under mpirun the process is not the program
 
     def share(self, name):
         return float(re.findall(rf"^{name}\s+time \(%\) = \S+ \((\S+)\)", self.log, re.M)[-1]) / 100
@@ -223,16 +226,15 @@ class Bed:
         self.path.mkdir(parents=True, exist_ok=True)
         self.shape = Shape(shape_name, self.path)
         text, height = lattice(self.shape, count, self.width, seed)
-        self.steps = int(12000 + 6000 * (count / 1000)**(1 / 3))
-        key = hashlib.sha1((text + (DECKS / "in.settle").read_text() + str(self.steps)).encode()).hexdigest()[:10]
+        key = hashlib.sha1((text + (DECKS / "in.settle").read_text() + str(SETTLE)).encode()).hexdigest()[:10]
         self.data = self.path / f"bed-{key}.data"
         if not self.data.exists():
             print(f"settling {count} x {shape_name} ..", flush=True)
             (self.path / "lattice.data").write_text(text)
             fresh = self.path / "fresh.data"
             run = Run(program, "settle", {"shape": self.shape.file, "lattice": self.path / "lattice.data", "bed": fresh,
-                                          "width": self.width, "height": height, "steps": self.steps,
-                                          "tolerance": 1e-6, "n": count}, build_ranks(count))
+                                          "width": self.width, "height": height, "steps": SETTLE,
+                                          "tolerance": 1e-6, "n": count})
             (self.path / "settle.log").write_text(run.log)
             fresh.rename(self.data)
         self.key = key
@@ -280,7 +282,7 @@ class Job:
             earlier = None if state == "rest" else self.restart("rest")
             print(f"preparing {self.bed.count} x {self.case}, {state}, {self.name} ..", flush=True)
             fresh = file.with_suffix(".fresh")
-            self.run(earlier, build_ranks(self.bed.count), TURNS[state], 0, RELAX if state == "rest" else TURN, fresh)
+            self.run(earlier, 1, TURNS[state], 0, RELAX if state == "rest" else TURN, fresh)
             fresh.rename(file)
         return file
 
@@ -356,11 +358,6 @@ def steps_for(case, state, count, seconds):
     """About `seconds` of 2 us per particle-step; host spheres, which are faster, get more where steps are alike."""
     steps = max(100, round(seconds * 1e6 / (2 * count)))
     return steps * 6 if case == "sphere" and state == "rest" else steps
-
-
-def build_ranks(count):
-    """Big beds are made on two ranks."""
-    return 1 if count < 4000 else min(2, os.cpu_count() or 1)
 
 
 def jobs_of(options):
@@ -481,7 +478,7 @@ def drop(program, shape, tolerance, seed, place):
     text, height = lattice(shape, DROPPED, width, seed)
     (place / "lattice.data").write_text(text)
     run = Run(program, "settle", {"shape": shape.file, "lattice": place / "lattice.data", "bed": place / "settled.data",
-                                  "width": width, "height": height, "steps": 14000, "tolerance": tolerance,
+                                  "width": width, "height": height, "steps": SETTLE, "tolerance": tolerance,
                                   "n": DROPPED})
     table = np.array(list(run.tables[-1].values()))
     kinetic, weight, total = table[1] + table[2], table[3], table[1:8].sum(0)
