@@ -45,11 +45,6 @@ class AtomVecNurbs : public AtomVec {
   const nurbs::Bodies& update_bodies(int immobile);
   const nurbs::Bodies& bodies() const { return bodies_; }
 
-  // Angular momentum of owned particle i about its centre of mass, lab axes. Between steps `omega` is what
-  // counts, so that any command may set it; the momentum it was last made from is kept beside it and used as
-  // long as omega is still the one made from it, so that a free particle keeps its momentum to the last bit.
-  nurbs::Vec3 angular_momentum(int i) const;
-  void set_angular_momentum(int i, const nurbs::Vec3& momentum);
   int shape_number(int i) const { return shapetype_[i]; }
 
   // Angular momentum of owned particle i about its centre of mass, lab axes. Between steps `omega` is what
