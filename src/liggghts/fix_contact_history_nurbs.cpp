@@ -109,6 +109,14 @@ void FixContactHistoryNurbs::setup_pre_exchange() {
   if (computeflag_ != nullptr && *computeflag_) pre_exchange();
 }
 
+void FixContactHistoryNurbs::recall(int i, int tag, nurbs::PairProof* to) const {
+  for (int n = 0; n < npartner_[i]; ++n)
+    if (partner_[i][n] == tag) {
+      *to = proof(i, n);
+      return;
+    }
+}
+
 int FixContactHistoryNurbs::count_contacts(int i) const {
   int count = 0;
   for (int n = 0; n < npartner_[i]; ++n) count += pool().holds(proof(i, n).contact);

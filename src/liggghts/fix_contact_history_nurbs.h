@@ -1,9 +1,9 @@
 // fix contacthistory, as pair gran/nurbs needs it: the host's own (per-pair history across reneighbouring,
-// ranks and restarts) under the host's name, with four things changed. It finds the pair style under a name
+// ranks and restarts) under the host's name, with five things changed. It finds the pair style under a name
 // other than "gran"; it keeps the history of neighbours that don't touch but have something proven, the
-// PairProof, which is all that the host's history holds; the contacts of those that touch, which the pair
-// style owns (scene/contact_pool.h), travel behind it; and it carries the dissipated energy. With another
-// pair style it is the host's fix.
+// PairProof, which is all that the host's history holds, also where the bounding spheres are apart; the
+// contacts of those that touch, which the pair style owns (scene/contact_pool.h), travel behind it; and it
+// carries the dissipated energy. With another pair style it is the host's fix.
 #ifdef FIX_CLASS
 
 FixStyle(contacthistory,FixContactHistoryNurbs)
@@ -33,6 +33,10 @@ class FixContactHistoryNurbs : public FixContactHistory {
   void unpack_restart(int i, int nth) override;
   int size_restart(int i) override;
   int maxsize_restart() override;
+
+  // What owned particle i remembered of the particle `tag` when the neighbour lists were last made; the host
+  // forgets it where the bounding spheres are apart. Nothing when it remembered nothing.
+  void recall(int i, int tag, nurbs::PairProof* to) const;
 
  protected:
   void allocate_pages() override;

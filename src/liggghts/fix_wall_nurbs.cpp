@@ -153,9 +153,8 @@ void FixWallNurbs::post_force(int) {
   step.settings = settings_;
   step.laws = &law_;
   stages_.compute(step);
-  for (int i = 0; i < atom->nlocal; ++i) {
+  for (const int i : stages_.loaded()) {
     const nurbs::ContactStages::Sum sum = stages_.sum(i);
-    if (!sum.any) continue;
     Vec3Map(atom->f[i]) += sum.force;
     Vec3Map(atom->torque[i]) += sum.torque;
   }

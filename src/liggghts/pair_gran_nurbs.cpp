@@ -195,12 +195,14 @@ void PairGranNurbs::warn_time_step() {
 // A pair is solved in tag order, so that ranks that both own half of it compute the same bits.
 void PairGranNurbs::hand_in_neighbours() {
   stages_.begin_neighbours();
+  const auto& history = static_cast<const FixContactHistoryNurbs&>(*fix_history);
   const int* tag = atom->tag;
   for (int ii = 0; ii < list->inum; ++ii) {
     const int i = list->ilist[ii];
     auto* proofs = reinterpret_cast<nurbs::PairProof*>(listgranhistory->firstdouble[i]);
     for (int jj = 0; jj < list->numneigh[i]; ++jj) {
       const int j = list->firstneigh[i][jj] & NEIGHMASK;
+      if (proofs[jj].stamp == 0) history.recall(i, tag[j], proofs + jj);
       const bool swap = tag[j] < tag[i];
       stages_.add_neighbour(swap ? j : i, swap ? i : j, proofs + jj);
     }
@@ -237,9 +239,8 @@ void PairGranNurbs::compute_force(int eflag, int vflag, int addflag) {
 }
 
 void PairGranNurbs::add_forces() {
-  for (int i = 0; i < atom->nlocal; ++i) {
+  for (const int i : stages_.loaded()) {
     const nurbs::ContactStages::Sum sum = stages_.sum(i);
-    if (!sum.any) continue;
     const double factor = relax(i);
     Vec3Map(atom->f[i]) += factor * sum.force;
     Vec3Map(atom->torque[i]) += factor * sum.torque;

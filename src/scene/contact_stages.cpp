@@ -11,6 +11,7 @@ namespace nurbs {
 namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
+constexpr int kUnique = kLocalModelSize - 1;
 constexpr double kBudgetShare = 1 - 1e-12;  // of a proven gap: sums of paths are rounded
 
 // Numbers `field` ... of the contacts `first` to first + kWidth - 1 of a block.
@@ -158,7 +159,9 @@ double ContactStages::smaller_radius(int a, int b) const {
 // What was remembered of bodies as they are no longer, or by another solver, is dropped; the law's state
 // stays.
 void ContactStages::check_stamps() {
+  neighbour_weight_ = 0;
   for (std::size_t k = 0; k < a_.size(); ++k) {
+    neighbour_weight_ += share(a_[k], b_[k]);
     PairProof& proof = *proofs_[k];
     if (proof.contact == 0) {
       expiry_[k] = -kInfinity;
@@ -174,8 +177,7 @@ void ContactStages::check_stamps() {
     empty.proof.contact = proof.contact;
     proof = empty.proof;
     block.set(lane, 0, kLocalModelSize, &empty.model);
-    block.set(lane, kLocalModelSize, 5, &empty.on_a);
-    block.set(lane, kLocalModelSize + 5, 5, &empty.on_b);
+    block.set(lane, kLocalModelSize, 10, &empty.on_a);
   }
 }
 
@@ -313,8 +315,9 @@ void ContactStages::compute(const Step& step) {
   deep_ = DeepContacts{};
   unresolved_ = Unresolved{};
   fresh_.clear();
-  sums_.resize(step.owned);
-  std::fill(sums_.begin(), sums_.end(), Accumulator{});
+  for (const int i : loaded_) sums_[i] = Accumulator{};
+  loaded_.clear();
+  if (static_cast<int>(sums_.size()) < step.owned) sums_.resize(step.owned, Accumulator{});
   wall_sum_ = Accumulator{};
   if (renewed_ || step.bodies->reshaped() || step.setup) check_stamps();
   renewed_ = false;
@@ -322,16 +325,19 @@ void ContactStages::compute(const Step& step) {
   for (ContactBlock& block : pool_.blocks())
     if (block.used != 0) compute_block(block);
 
-  double all = 0;
-  for (std::size_t k = 0; k < a_.size(); ++k) all += share(a_[k], b_[k]);
   double others = 0;
   for (int n = ContactCounts::bounds; n <= ContactCounts::fallback; ++n) others += counts_.value[n];
-  counts_.value[ContactCounts::neighbours] = all;
-  counts_.value[ContactCounts::safe] = std::max(0.0, all - others);
+  counts_.value[ContactCounts::neighbours] = neighbour_weight_;
+  counts_.value[ContactCounts::safe] = std::max(0.0, neighbour_weight_ - others);
 }
 
 // Stage (c) for the contacts first to first + kWidth - 1.
 void ContactStages::serve(const ContactBlock& block, int first, Results& results) const {
+  const Wide unique = lanes(block, kUnique, first);
+  if (none_of(unique > 0.0)) {
+    std::memset(&results.served[first], 0, sizeof unique);
+    return;
+  }
   const double *of_a[kWidth], *of_b[kWidth];
   for (int l = 0; l < kWidth; ++l) {
     const bool used = block.used >> (first + l) & 1;
@@ -344,8 +350,7 @@ void ContactStages::serve(const ContactBlock& block, int first, Results& results
   const Triple<Wide> offset = b.x - a.x;
   const LocalContactOf<Wide> c = evaluate_local(
       support_lanes(block, 0, first), support_lanes(block, 14, first), a.turn, b.turn, offset, a.free);
-  const WideMask served =
-      serves<Wide>(c, lanes(block, 28, first), step_.settings.tolerance, smaller(a.radius, b.radius));
+  const WideMask served = serves<Wide>(c, unique, step_.settings.tolerance, smaller(a.radius, b.radius));
   const Wide zero{}, one = all<Wide>(1);
   const Wide roundoff = kRoundoff * (magnitude(offset.x) + magnitude(offset.y) + magnitude(offset.z));
   const Wide lower = c.gap - c.error - roundoff;
@@ -371,8 +376,7 @@ void ContactStages::solve_lane(ContactBlock& block, int lane, Results& results) 
   const int a = block.a[lane], b = block.b[lane];
   PairMemory memory;
   memory.proof = *block.proof[lane];
-  block.get(lane, kLocalModelSize, 5, &memory.on_a);
-  block.get(lane, kLocalModelSize + 5, 5, &memory.on_b);
+  block.get(lane, kLocalModelSize, 10, &memory.on_a);
   drop_model(&memory.model);
   const ContactResult r = search(a, b, memory);
   count(r, a, b);
@@ -382,9 +386,11 @@ void ContactStages::solve_lane(ContactBlock& block, int lane, Results& results) 
   const std::int32_t contact = block.proof[lane]->contact;
   *block.proof[lane] = memory.proof;
   block.proof[lane]->contact = contact;
-  block.set(lane, 0, kLocalModelSize, &memory.model);
-  block.set(lane, kLocalModelSize, 5, &memory.on_a);
-  block.set(lane, kLocalModelSize + 5, 5, &memory.on_b);
+  if (memory.model.unique > 0)
+    block.set(lane, 0, kLocalModelSize, &memory.model);
+  else
+    block.field[kUnique][lane] = memory.model.unique;
+  block.set(lane, kLocalModelSize, 10, &memory.on_a);
 }
 
 void ContactStages::compute_block(ContactBlock& block) {
@@ -566,6 +572,7 @@ void ContactStages::apply_law(ContactBlock& block, int first, const Results& res
 void ContactStages::add_load(int body, const double* load) {
   if (body >= step_.owned) return;
   Accumulator& to = body < 0 ? wall_sum_ : sums_[body];
+  if (body >= 0 && to.high[7] == 0) loaded_.push_back(body);
   Lane8 x, high, low;
   std::memcpy(&x, load, sizeof x);
   std::memcpy(&high, to.high, sizeof high);
@@ -579,7 +586,7 @@ void ContactStages::add_load(int body, const double* load) {
 ContactStages::Sum ContactStages::total(const Accumulator& s) {
   double t[8];
   for (int k = 0; k < 8; ++k) t[k] = s.high[k] + s.low[k];
-  return {load(t), load(t + 3), t[6], t[7] != 0};
+  return {load(t), load(t + 3), t[6]};
 }
 
 // --- reports

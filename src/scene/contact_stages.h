@@ -82,7 +82,6 @@ class ContactStages {
   struct Sum {
     Vec3 force, torque;
     double normal;  // sum of the normal forces
-    bool any;
   };
 
   // Who is whose neighbour from now on: begin, a call per pair (a is A of the pair, negative: the wall), end.
@@ -99,6 +98,8 @@ class ContactStages {
   void compute(const Step& step);
 
   // Sums over the contacts of the last compute: of an owned body, and of the wall (torque about its x).
+  // Bodies that are not among `loaded` have none.
+  const std::vector<int>& loaded() const { return loaded_; }
   Sum sum(int i) const { return total(sums_[i]); }
   Sum wall_sum() const { return total(wall_sum_); }
 
@@ -121,7 +122,7 @@ class ContactStages {
 
  private:
   struct alignas(64) Accumulator {
-    double high[8], low[8];  // force, torque, normal force, number of contacts; and what was lost of them
+    double high[8], low[8];  // force, torque, normal force, number of contacts; what was lost of them
   };
   struct Results;
   static Sum total(const Accumulator& s);
@@ -160,8 +161,10 @@ class ContactStages {
 
   ContactPool pool_;
   std::vector<ContactResult> fresh_;  // results of contacts that stage (b) found
-  LineVector<Accumulator> sums_;
+  LineVector<Accumulator> sums_;      // zero but for the loaded
+  std::vector<int> loaded_;
   Accumulator wall_sum_{};
+  double neighbour_weight_ = 0;
   Step step_;
   ContactCounts counts_;
   DeepContacts deep_;
