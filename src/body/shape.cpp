@@ -229,6 +229,7 @@ void build(Draft& draft, const std::optional<Mat3>& gyration) {
   set_gyration(draft.shape, gyration);
   measure(draft);
   build_atlas(draft.shape, kAtlasCells);
+  draft.shape.flats = find_flat_features(draft.shape);
 }
 
 }  // namespace
