@@ -496,7 +496,7 @@ PolygonState evaluate(const ContactPolygon& polygon, const BodyFrame& a, const B
 PolygonVerdict judge(const ContactPolygon& polygon, const PolygonState& state) {
   if (!(state.least < 0)) return PolygonVerdict::open;
   if (polygon.rolling != 0 || state.slid > polygon.room) return PolygonVerdict::moved;
-  return state.most > 0 ? PolygonVerdict::tilted : PolygonVerdict::keep;
+  return state.most > 0 || polygon.count == 2 ? PolygonVerdict::tilted : PolygonVerdict::keep;
 }
 
 double support_gap(const ContactPolygon& polygon, const Particle* a, const Particle& b, const Vec3& origin) {
