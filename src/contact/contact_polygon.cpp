@@ -112,7 +112,8 @@ bool finish(const Candidates& from, double overlap, double least, const Vec2* ce
   const double* const deepest = std::min_element(from.gap, end);
   const bool tilted = *std::max_element(from.gap, end) - *deepest > kLeadShare * overlap;
   int kept[ConvexPolygon::kMost];
-  const int count = thin(from.plane, kContactPoints, tilted ? static_cast<int>(deepest - from.gap) : 0, kept);
+  const int count = thin(from.plane, kContactPoints, tilted ? static_cast<int>(deepest - from.gap) : 0,
+                         tilted ? kLeadNeighbours : 0, kept);
   ConvexPolygon few;
   for (int i = 0; i < count; ++i) few.add(from.plane.corner[kept[i]], 0, 0);
   double weight[ConvexPolygon::kMost];
@@ -143,6 +144,36 @@ double gap_below(const Body& incident, const ReferencePlane& plane) {
   return plane.normal.dot(incident.frame.x - plane.origin) - incident.frame.scale * h - plane.level;
 }
 
+// A round outline is inscribed: the corner of it (shape axes) next to the support point moves there, provided
+// that the point lies within `tolerance` of the face's plane and next to the outline. A body that leans
+// stands on it.
+void move_corner_to(const Vec3& support, const FlatFace& face, double tolerance, Vec3* outline, int count) {
+  if (face.offset - face.normal.dot(support) > tolerance) return;
+  int nearest = 0;
+  for (int i = 1; i < count; ++i)
+    if ((outline[i] - support).squaredNorm() < (outline[nearest] - support).squaredNorm()) nearest = i;
+  const Vec3& next = outline[nearest + 1 < count ? nearest + 1 : 0];
+  if ((support - outline[nearest]).squaredNorm() > (next - outline[nearest]).squaredNorm()) return;
+  outline[nearest] = support;
+}
+
+// The corners of a face, shape axes, from outside: moved as above when the face is round and the body leans.
+// `height`(s): of a point above the plane it stands on, `support`(): the support point towards it.
+template <class Height, class Support>
+int standing_outline(const Shape& shape, const FlatFace& face, double overlap, double tolerance,
+                     const Height& height, const Support& support, Vec3* outline) {
+  int count = 0;
+  double least = kInfinite, most = -kInfinite;
+  for (const int v : face.outline) {
+    outline[count++] = shape.flats.vertices[v];
+    least = std::min(least, height(shape.flats.vertices[v]));
+    most = std::max(most, height(shape.flats.vertices[v]));
+  }
+  if (face.round && most - least > kLeadShare * overlap)
+    move_corner_to(support(), face, tolerance, outline, count);
+  return count;
+}
+
 // One attempt at a pair's polygon with a given face as the reference.
 class FaceContact {
  public:
@@ -155,14 +186,14 @@ class FaceContact {
 
   double deepest_gap() const { return gap_below(incident_, plane_); }
 
-  // Points with gaps up to `most`, on a region larger than `least`. `swallowed`: the reference face lies
-  // inside the incident one.
-  bool make(double overlap, double most, double least, ContactPolygon* out, bool* swallowed) {
+  // `swallowed`: the reference face lies inside the incident one.
+  bool make(double overlap, double reach, ContactPolygon* out, bool* swallowed) {
     for (const int v : face_.outline)
       window_.add(plane_.project(reference_.place(reference_.vertex(v))), 0, 0);
     *swallowed = false;
-    if (!face_points(most, swallowed) && !crease_points(most) && !line_points(most)) return false;
-    if (!finish(points_, overlap, least, nullptr, out)) return false;
+    const double most = reach - overlap;
+    if (!face_points(overlap, reach, swallowed) && !crease_points(most) && !line_points(most)) return false;
+    if (!finish(points_, overlap, reach, nullptr, out)) return false;
     out->reference = reference_.index;
     out->rolling = rolling_;
     out->factor = 1;
@@ -179,7 +210,7 @@ class FaceContact {
                                  : crossing_id(side_of_incident, side_of_reference);
   }
 
-  bool face_points(double most, bool* swallowed) {
+  bool face_points(double overlap, double reach, bool* swallowed) {
     const FlatFeatures& flats = incident_.shape->flats;
     const int f = nearest_face(flats, incident_.turned_back(-plane_.normal), kFaceCosine);
     if (f < 0) return false;
@@ -187,9 +218,14 @@ class FaceContact {
     // Counterclockwise seen from the incident body's outside is clockwise about the reference's normal.
     const int n = static_cast<int>(face.outline.size());
     const auto vertex = [&](int i) { return face.outline[n - 1 - i % n]; };
+    Vec3 outline[kOutlinePoints];
+    standing_outline(
+        *incident_.shape, face, overlap, reach / incident_.frame.scale,
+        [&](const Vec3& s) { return plane_.height(incident_.place(s)); },
+        [&] { return find_hull_support(*incident_.shape, incident_.turned_back(-plane_.normal)).point; },
+        outline);
     ConvexPolygon subject;
-    for (int i = 0; i < n; ++i)
-      subject.add(plane_.project(incident_.place(incident_.vertex(vertex(i)))), 0, 0);
+    for (int i = 0; i < n; ++i) subject.add(plane_.project(incident_.place(outline[n - 1 - i])), 0, 0);
     const ConvexPolygon cut = intersect(subject, window_, slack_);
     if (cut.count < 3) return false;
     const Vec3 normal = incident_.turned(face.normal);
@@ -205,7 +241,7 @@ class FaceContact {
       *swallowed = *swallowed && others;
       if (own) {
         const int v = vertex(cut.side[i]);
-        const Vec3& point = incident_.vertex(v);
+        const Vec3& point = outline[n - 1 - cut.side[i]];
         points_.add(cut.corner[i], point, plane_.height(incident_.place(point)),
                     vertex_id(incident_.index, v));
         continue;
@@ -225,7 +261,7 @@ class FaceContact {
       }
       points_.add(at, incident_.to_shape(plane_.lift(at, height)), height, id);
     }
-    return points_.within(most);
+    return points_.within(reach - overlap);
   }
 
   // The part of a segment of the incident body over the reference face; false unless it is within reach.
@@ -362,19 +398,6 @@ bool line_contact(const Body& a, const Body& b, const Vec3& d, double overlap, d
   return true;
 }
 
-// A round face on a plane: its outline with the corner next to the support point moved there.
-void lead_by_support(const FlatFace& face, const SupportSet& set, double tolerance, Candidates& points) {
-  if (face.offset - face.normal.dot(set.support) > tolerance) return;
-  const Vec2 at = face.project(set.support);
-  int nearest = 0;
-  for (int i = 1; i < points.plane.count; ++i)
-    if ((points.plane.corner[i] - at).norm() < (points.plane.corner[nearest] - at).norm()) nearest = i;
-  const Vec2 side = points.plane.corner[points.plane.next(nearest)] - points.plane.corner[nearest];
-  if ((points.plane.corner[nearest] - at).norm() > side.norm()) return;
-  points.plane.corner[nearest] = at;
-  points.on_body[nearest] = set.support;
-}
-
 }  // namespace
 
 BodyFrame body_frame(const Particle& particle) {
@@ -401,17 +424,12 @@ bool make_plane_polygon(const Particle& particle, const Vec3& origin, const Vec3
   const bool face = set.face >= 0;
   if (face) {
     const FlatFace& f = shape.flats.faces[set.face];
-    for (const int v : f.round ? f.outline : f.corners) {
-      const Vec3& s = shape.flats.vertices[v];
-      points.add(f.project(s), s, height(s), vertex_id(1, v));
-    }
+    Vec3 outline[kOutlinePoints];
+    const int count = standing_outline(
+        shape, f, overlap, reach / frame.scale, height, [&] { return set.support; }, outline);
+    for (int i = 0; i < count; ++i)
+      points.add(f.project(outline[i]), outline[i], height(outline[i]), vertex_id(1, f.outline[i]));
     centre = f.project(f.centroid);
-    double lag = 0;
-    for (int i = 0; i < points.plane.count; ++i) lag = std::max(lag, points.gap[i] + overlap);
-    if (f.round && lag > kLeadShare * overlap) {
-      lead_by_support(f, set, reach / frame.scale, points);
-      for (int i = 0; i < points.plane.count; ++i) points.gap[i] = height(points.on_body[i]);
-    }
   } else {
     const double length = (set.point[1] - set.point[0]).norm();
     for (int i = 0; i < 2; ++i)
@@ -445,7 +463,7 @@ bool make_pair_polygon(const Particle& pa, const Particle& pb, const Vec3& norma
     if (!(depth[reference] <= most)) return false;
     const Body &owner = reference == 0 ? a : b, &other = reference == 0 ? b : a;
     const FlatFace& face = owner.shape->flats.faces[reference == 0 ? face_a : face_b];
-    return FaceContact(owner, face, other).make(overlap, reach - overlap, reach, polygon, swallowed);
+    return FaceContact(owner, face, other).make(overlap, reach, polygon, swallowed);
   };
   bool swallowed = false;
   if (attempt(first, out, &swallowed)) {

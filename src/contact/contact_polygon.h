@@ -30,9 +30,10 @@
 //       ruled
 //               line, which rolls: remake. Book the jump stored_energy(new) - stored_energy(old), or take it
 //               up in the factor. It is of second order: none under a uniform gap, whatever the weights.
-//       tilted: some points are open, so the body may touch elsewhere: compare with support_gap (one support
-//               search) by outgrown(); only if that says so, remake. As long as no point is open it can't:
-//               beside a flat face the body falls away, and an octagon lacks 8 % of a rim's tilt at most.
+//       tilted: some points are open, or it stands on a crease, so the body may touch elsewhere: compare with
+//               support_gap (one support search) by outgrown(); only if that says so, remake. Where all
+//               points of a face are closed it can't be: beside a face the body falls away, and an octagon
+//               lacks 8 % of a rim's tilt at most.
 //     A remake that yields count = 0 hands back to the single point with factor continuity.
 //  4. match() tells from which old point every new one inherits its history (a spring xi_i is a displacement,
 //  the
@@ -54,9 +55,11 @@ constexpr double kSlideShare = 1e-3;  // of the polygon's size that cut points m
                                       // jump of the torque by 5e-4, of U by 1e-7
 constexpr double kReferenceShare = 0.05;  // of the overlap by which the other face must be the shallower one
                                           // to become the reference
-constexpr double kOutgrownShare = 0.1;  // of the overlap by which the body may be deeper than its points
-constexpr double kLeadShare = 0.1;      // lag, in overlaps, above which a round face's deepest point is kept
-constexpr double kClipSlack = 1e-9;     // of the larger bounding radius: places that count as equal
+constexpr double kOutgrownShare = 0.1;    // of the overlap by which the body may be deeper than its points
+constexpr double kLeadShare = 0.1;   // lag, in overlaps, above which a body counts as leaning: a round face
+                                     // then keeps its deepest point and ...
+constexpr int kLeadNeighbours = 2;   // ... these beside it: it tips over its rim, not over an octagon
+constexpr double kClipSlack = 1e-9;  // of the larger bounding radius: places that count as equal
 
 struct ContactPolygon {
   std::int32_t count;               // 0: none; 2: a segment; 3 to 8: in order around the polygon

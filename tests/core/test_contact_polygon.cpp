@@ -119,7 +119,9 @@ TEST(PlanePolygon, faces_lines_and_points) {
     EXPECT_NEAR(off.norm(), askew ? 0.2 * half * scale : 0, 1e-9);
     EXPECT_NEAR(support_gap(polygon, nullptr, p, scene.x), -overlap, 1e-12);
     EXPECT_NEAR(stored_energy(polygon, state), 0.5 * overlap * overlap, 1e-14);
-    EXPECT_EQ(judge(polygon, state), c.rolling ? PolygonVerdict::moved : PolygonVerdict::keep);
+    EXPECT_EQ(judge(polygon, state), c.rolling       ? PolygonVerdict::moved
+                                     : c.points == 2 ? PolygonVerdict::tilted
+                                                     : PolygonVerdict::keep);
   }
 }
 
