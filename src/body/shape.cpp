@@ -247,6 +247,7 @@ void build(Draft& draft, const std::optional<Mat3>& gyration) {
   measure(draft);
   build_atlas(draft.shape, kAtlasCells);
   draft.shape.stamp = content_stamp(draft.shape);
+  draft.shape.flats = find_flat_features(draft.shape);
 }
 
 }  // namespace

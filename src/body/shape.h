@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "body/direction_atlas.h"
+#include "body/flat_faces.h"
 #include "body/normal_map.h"
 #include "body/rolling.h"
 #include "nurbs/bezier_patch.h"
@@ -73,6 +74,7 @@ struct Shape {
   JointDistance joints;                    // to kinked joints: where the patch curvatures hold for the body
   NormalMap normal_map;                    // local bounds, for bodies with flats or dents
   DirectionAtlas atlas;
+  FlatFeatures flats;  // faces, creases and ruled lines; empty for round bodies
 
   // Whether a local maximum of d . x may be no global one.
   bool dented() const { return support_excess > kRoundoff * bounding_radius; }

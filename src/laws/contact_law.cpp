@@ -33,6 +33,13 @@ BodyMotionOf<double> as_values(const BodyMotion& m) {
 LinearLawOf<double> as_values(const ContactCoefficients& law) {
   return {law.kn, law.kt, law.cn, law.ct, law.mu};
 }
+// Velocity of B relative to A with the same momenta, in the orientations and at the contact point of the last
+// step.
+Vec3 earlier_velocity(const BodyMotion& a, const BodyMotion& b, const ContactState& state) {
+  return b.velocity - a.velocity + b.spin_before.cross(load(state.arm_b)) -
+         a.spin_before.cross(load(state.arm_a));
+}
+
 ContactStateOf<double> as_values(const ContactState& state) {
   ContactStateOf<double> s;
   std::memcpy(&s, &state, sizeof s);
@@ -119,20 +126,26 @@ bool set_contact(const ContactCoefficients& law, const ContactGeometry& g, const
   return false;
 }
 
-void end_contact(const ContactCoefficients& law, const BodyMotion& a, const BodyMotion& b, double dt,
-                 ContactState& state, EnergyLedger& ledger) {
+void finish_contact(const ContactCoefficients& law, const BodyMotion& a, const BodyMotion& b, double dt,
+                    const ContactState& state, EnergyLedger& ledger) {
   if (state.active == 0) return;
-  using namespace law_detail;
-  const Vec3 before = b.velocity - a.velocity + b.spin_before.cross(load(state.arm_b)) -
-                      a.spin_before.cross(load(state.arm_a)),
-             spring = load(state.spring), normal = load(state.normal);
   ContactWorkOf<double> work{};
-  add_work(later_half(as_values(law), as_values(state), triple(before), dt), state.sliding, &work);
-  work.friction += 0.5 * law.kt * spring.dot(spring + dt * (before - normal.dot(before) * normal));
-  state = ContactState{};
+  law_detail::add_work(
+      law_detail::later_half(as_values(law), as_values(state), triple(earlier_velocity(a, b, state)), dt),
+      state.sliding, &work);
   if (!std::isfinite(work.damping + work.friction)) return;
   ledger.damping += work.damping;
   ledger.friction += work.friction;
+}
+
+void end_contact(const ContactCoefficients& law, const BodyMotion& a, const BodyMotion& b, double dt,
+                 ContactState& state, EnergyLedger& ledger) {
+  if (state.active == 0) return;
+  finish_contact(law, a, b, dt, state, ledger);
+  const Vec3 before = earlier_velocity(a, b, state), spring = load(state.spring), normal = load(state.normal);
+  const double lost = 0.5 * law.kt * spring.dot(spring + dt * (before - normal.dot(before) * normal));
+  state = ContactState{};
+  if (std::isfinite(lost)) ledger.friction += lost;
 }
 
 EnergyLedger stored_energy(const ContactCoefficients& law, const ContactState& state) {

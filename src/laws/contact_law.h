@@ -94,6 +94,16 @@ bool set_contact(const ContactCoefficients& law, const ContactGeometry& geometry
 void end_contact(const ContactCoefficients& law, const BodyMotion& a, const BodyMotion& b, double dt,
                  ContactState& state, EnergyLedger& ledger);
 
+// Finishes the dissipation of a contact up to now, as end_contact does, but leaves its spring: for one whose
+// place is taken by others.
+void finish_contact(const ContactCoefficients& law, const BodyMotion& a, const BodyMotion& b, double dt,
+                    const ContactState& state, EnergyLedger& ledger);
+
+// Coefficients of a contact that carries a share of a pair's stiffness.
+inline ContactCoefficients scaled(const ContactCoefficients& law, double weight) {
+  return {weight * law.kn, weight * law.kt, weight * law.cn, weight * law.ct, law.mu};
+}
+
 // Elastic energies of a state.
 EnergyLedger stored_energy(const ContactCoefficients& law, const ContactState& state);
 

@@ -97,12 +97,12 @@ void FixContactHistoryNurbs::pre_exchange() {
   });
   FixContactHistory::pre_exchange();
   for_each_neighbour([](int& flag, const double*) { flag &= kTouching; });
-  for (int i = 0; i < atom->nlocal; ++i) most = std::max(most, count_contacts(i));
+  for (int i = 0; i < atom->nlocal; ++i) most = std::max(most, contacts_size(i));
   // The host takes the maximum over fixes of what one particle sends; walls send theirs beside this.
   const int walls = modify->n_fixes_style("wall/nurbs");
   comm->maxexchange_fix =
-      std::max(comm->maxexchange_fix, (dnum_ + 1) * maxtouch_ + 1 + most * nurbs::kContactSize +
-                                          walls * (nurbs::kProofSize + nurbs::kContactSize));
+      std::max(comm->maxexchange_fix,
+               (dnum_ + 1) * maxtouch_ + 1 + most + walls * (nurbs::kProofSize + nurbs::kMostContactSize));
 }
 
 void FixContactHistoryNurbs::setup_pre_exchange() {
@@ -117,21 +117,18 @@ void FixContactHistoryNurbs::recall(int i, int tag, nurbs::PairProof* to) const 
     }
 }
 
-int FixContactHistoryNurbs::count_contacts(int i) const {
-  int count = 0;
-  for (int n = 0; n < npartner_[i]; ++n) count += pool().holds(proof(i, n).contact);
-  return count;
+int FixContactHistoryNurbs::contacts_size(int i) const {
+  int size = 0;
+  for (int n = 0; n < npartner_[i]; ++n)
+    if (pool().holds(proof(i, n).contact)) size += pool().packed_size(proof(i, n).contact);
+  return size;
 }
 
 // The contacts of particle i, behind its proofs and in their order.
 int FixContactHistoryNurbs::put_contacts(int i, double* buffer) const {
   int m = 0;
-  for (int n = 0; n < npartner_[i]; ++n) {
-    if (!pool().holds(proof(i, n).contact)) continue;
-    const nurbs::ContactRecord record = pool().get(proof(i, n).contact);
-    std::memcpy(buffer + m, &record, sizeof record);
-    m += nurbs::kContactSize;
-  }
+  for (int n = 0; n < npartner_[i]; ++n)
+    if (pool().holds(proof(i, n).contact)) m += pool().pack(proof(i, n).contact, buffer + m);
   return m;
 }
 
@@ -140,10 +137,9 @@ int FixContactHistoryNurbs::get_contacts(int i, const double* buffer) {
   int m = 0;
   for (int n = 0; n < npartner_[i]; ++n) {
     if (proof(i, n).contact == 0) continue;
-    nurbs::ContactRecord record;
-    std::memcpy(&record, buffer + m, sizeof record);
-    proof(i, n).contact = pool().add(record);
-    m += nurbs::kContactSize;
+    int size = 0;
+    proof(i, n).contact = pool().unpack(buffer + m, &size);
+    m += size;
   }
   return m;
 }
@@ -160,16 +156,16 @@ int FixContactHistoryNurbs::unpack_exchange(int i, double* buffer) {
 
 int FixContactHistoryNurbs::size_restart(int i) {
   const int size = FixContactHistory::size_restart(i);
-  return serves_nurbs() ? size + count_contacts(i) * nurbs::kContactSize : size;
+  return serves_nurbs() ? size + contacts_size(i) : size;
 }
 
 int FixContactHistoryNurbs::maxsize_restart() {
   const int size = FixContactHistory::maxsize_restart();
   if (!serves_nurbs()) return size;
   int mine = 0, most = 0;
-  for (int i = 0; i < atom->nlocal; ++i) mine = std::max(mine, count_contacts(i));
+  for (int i = 0; i < atom->nlocal; ++i) mine = std::max(mine, contacts_size(i));
   MPI_Allreduce(&mine, &most, 1, MPI_INT, MPI_MAX, world);
-  return size + most * nurbs::kContactSize;
+  return size + most;
 }
 
 int FixContactHistoryNurbs::pack_restart(int i, double* buffer) {

@@ -49,7 +49,7 @@ class FixContactHistoryNurbs : public FixContactHistory {
 
   nurbs::PairProof& proof(int i, int n) const;
   nurbs::ContactPool& pool() const;
-  int count_contacts(int i) const;
+  int contacts_size(int i) const;
   int put_contacts(int i, double* buffer) const;
   int get_contacts(int i, const double* buffer);
 };

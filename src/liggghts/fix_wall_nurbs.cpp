@@ -86,7 +86,8 @@ void FixWallNurbs::init() {
   for (int k = 0; k < modify->nfix; ++k)
     if (std::strcmp(modify->fix[k]->style, "freeze") == 0) freeze_groupbit_ = modify->fix[k]->groupbit;
   const int walls = static_cast<int>(all(lmp).size());
-  comm->maxexchange_fix = std::max(comm->maxexchange_fix, walls * (nurbs::kProofSize + nurbs::kContactSize));
+  comm->maxexchange_fix =
+      std::max(comm->maxexchange_fix, walls * (nurbs::kProofSize + nurbs::kMostContactSize));
   ledger_ = nurbs_host::wants_ledger(lmp);
   warn_periodic();
   warn_time_step();
@@ -204,19 +205,16 @@ int FixWallNurbs::pack_exchange(int i, double* buffer) {
   if (!touching) own.contact = 0;
   std::memcpy(buffer, &own, sizeof own);
   if (!touching) return nurbs::kProofSize;
-  const nurbs::ContactRecord record = stages_.pool().get(own.contact);
-  std::memcpy(buffer + nurbs::kProofSize, &record, sizeof record);
-  return nurbs::kProofSize + nurbs::kContactSize;
+  return nurbs::kProofSize + stages_.pool().pack(own.contact, buffer + nurbs::kProofSize);
 }
 
 int FixWallNurbs::unpack_exchange(int i, double* buffer) {
   nurbs::PairProof& own = proof(i);
   std::memcpy(&own, buffer, sizeof own);
   if (own.contact == 0) return nurbs::kProofSize;
-  nurbs::ContactRecord record;
-  std::memcpy(&record, buffer + nurbs::kProofSize, sizeof record);
-  own.contact = stages_.pool().add(record);
-  return nurbs::kProofSize + nurbs::kContactSize;
+  int size = 0;
+  own.contact = stages_.pool().unpack(buffer + nurbs::kProofSize, &size);
+  return nurbs::kProofSize + size;
 }
 
 void FixWallNurbs::write_restart(FILE* file) {
@@ -239,7 +237,8 @@ void FixWallNurbs::restart(char* buffer) {
 }
 
 int FixWallNurbs::size_restart(int i) {
-  return 1 + nurbs::kProofSize + (stages_.pool().holds(proof(i).contact) ? nurbs::kContactSize : 0);
+  return 1 + nurbs::kProofSize +
+         (stages_.pool().holds(proof(i).contact) ? stages_.pool().packed_size(proof(i).contact) : 0);
 }
 
 int FixWallNurbs::pack_restart(int i, double* buffer) {

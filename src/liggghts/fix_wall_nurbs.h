@@ -45,7 +45,7 @@ class FixWallNurbs : public Fix {
   int pack_restart(int i, double* buffer) override;
   void unpack_restart(int i, int nth) override;
   int size_restart(int i) override;
-  int maxsize_restart() override { return 1 + nurbs::kProofSize + nurbs::kContactSize; }
+  int maxsize_restart() override { return 1 + nurbs::kProofSize + nurbs::kMostContactSize; }
   double memory_usage() override;
 
   // This rank's share. Dissipation is counted while there is a compute nurbs/energy.

@@ -274,7 +274,7 @@ void PairGranNurbs::tally(const nurbs::ContactView& contact) {
   Vec3Map{on_b + 3} = Eigen::Map<const Vec3>(state.arm_b).cross(force);
   if (evflag) {
     const Vec3 apart = Vec3Map(atom->x[contact.a]) - Vec3Map(atom->x[contact.b]);
-    ev_tally_xyz(contact.a, contact.b, atom->nlocal, 0, stored_energy(*contact.law, state).elastic(), 0,
+    ev_tally_xyz(contact.a, contact.b, atom->nlocal, 0, stored_energy(contact.law, state).elastic(), 0,
                  on_a[0], on_a[1], on_a[2], apart.x(), apart.y(), apart.z());
   }
   keep_contact_force(contact, on_a, on_b);

@@ -5,6 +5,7 @@
 #include <array>
 #include <cstring>
 
+#include "contact/contact_polygon.h"
 #include "contact/pair_memory.h"
 #include "laws/contact_law.h"
 #include "scene/bodies.h"
@@ -19,11 +20,13 @@ struct ContactRecord {
   ContactState state;      // of the law
   double torque[3];        // of the law beside its force, on B, lab axes
   double weight;           // share of the pair's stiffness that this contact has
-  double feature;          // which of the pair's contacts it is; 0: the only one
+  double flat;             // 0: the pair's only contact is this one; else its contacts are those of a polygon
 };
 constexpr int kContactSize = kLocalModelSize + 10 + kContactStateSize + 5;
 static_assert(sizeof(ContactRecord) == kContactSize * sizeof(double));
 constexpr int kStateField = kLocalModelSize + 10;
+
+constexpr int kWeight = kContactSize - 2, kFlat = kContactSize - 1;
 
 constexpr int kBlock = 8;
 
@@ -48,27 +51,30 @@ struct alignas(64) ContactBlock {
 };
 static_assert(sizeof(ContactBlock) <= kBlock * 640, "a contact's memory");
 
-// Contacts by number, from 1; 0 is none. Numbers stay until the contact is freed or the pool exchanged.
+// The contacts of a pair whose flat faces, creases or ruled lines meet: a block of their own, lane by lane
+// the points of the polygon. It hangs on the pair's contact, whose own state of the law is then empty.
+struct FlatContact {
+  ContactPolygon polygon;
+  ContactBlock points;
+};
+struct FlatRecord {  // as it travels
+  ContactPolygon polygon;
+  ContactState state[kBlock];
+};
+constexpr int kFlatSize = sizeof(FlatRecord) / sizeof(double);
+constexpr int kMostContactSize = kContactSize + kFlatSize;
+static_assert(kContactPoints <= kBlock && sizeof(FlatRecord) % sizeof(double) == 0);
+
+// Contacts by number, from 1; 0 is none. Numbers stay until the contact is removed.
 class ContactPool {
  public:
-  std::int32_t add() {
-    if (free_.empty()) {
-      blocks_.emplace_back();
-      std::memset(static_cast<void*>(&blocks_.back()), 0, sizeof(ContactBlock));
-      for (int lane = kBlock; lane-- > 0;)
-        free_.push_back(static_cast<std::int32_t>(blocks_.size() - 1) * kBlock + lane + 1);
-    }
-    const std::int32_t number = free_.back();
-    free_.pop_back();
-    block(number).used |= 1u << lane(number);
-    return number;
-  }
   std::int32_t add(const ContactRecord& record) {
-    const std::int32_t number = add();
+    const std::int32_t number = take(blocks_, free_);
     block(number).set(lane(number), 0, kContactSize, &record);
     return number;
   }
   void remove(std::int32_t number) {
+    drop_flat(number);
     block(number).used &= ~(1u << lane(number));
     free_.push_back(number);
   }
@@ -76,25 +82,96 @@ class ContactPool {
     return number > 0 && static_cast<std::size_t>(number) <= blocks_.size() * kBlock &&
            (blocks_[(number - 1) / kBlock].used >> lane(number) & 1);
   }
-  ContactRecord get(std::int32_t number) const {
-    ContactRecord record;
-    blocks_[(number - 1) / kBlock].get(lane(number), 0, kContactSize, &record);
-    return record;
+
+  // The polygon of a contact, or nullptr.
+  FlatContact* flat(std::int32_t number) { return flat_of(block(number), lane(number)); }
+  FlatContact* flat_of(const ContactBlock& block, int lane) {
+    const int index = static_cast<int>(block.field[kFlat][lane]);
+    return index == 0 ? nullptr : &flats_[index - 1];
   }
-  void clear() {
-    blocks_.clear();
-    free_.clear();
+  // Gives a contact a polygon, without points; pointers to others' polygons become invalid.
+  FlatContact& add_flat(std::int32_t number) {
+    if (free_flats_.empty()) {
+      flats_.emplace_back();
+      free_flats_.push_back(static_cast<int>(flats_.size()));
+    }
+    const int index = free_flats_.back();
+    free_flats_.pop_back();
+    block(number).field[kFlat][lane(number)] = index;
+    std::memset(static_cast<void*>(&flats_[index - 1]), 0, sizeof(FlatContact));
+    return flats_[index - 1];
+  }
+  void drop_flat(std::int32_t number) {
+    double& index = block(number).field[kFlat][lane(number)];
+    if (index == 0) return;
+    flats_[static_cast<int>(index) - 1].points.used = 0;
+    free_flats_.push_back(static_cast<int>(index));
+    index = 0;
+  }
+
+  // A contact with all that hangs on it as plain doubles, at most kMostContactSize of them: how many. And
+  // back: a new contact, and how many doubles it took.
+  int pack(std::int32_t number, double* to) const {
+    ContactRecord record;
+    const ContactBlock& from = blocks_[(number - 1) / kBlock];
+    from.get(lane(number), 0, kContactSize, &record);
+    std::memcpy(to, &record, sizeof record);
+    if (record.flat == 0) return kContactSize;
+    const FlatContact& flat = flats_[static_cast<int>(record.flat) - 1];
+    FlatRecord points;
+    points.polygon = flat.polygon;
+    for (int k = 0; k < kBlock; ++k) flat.points.get(k, kStateField, kContactStateSize, &points.state[k]);
+    std::memcpy(to + kContactSize, &points, sizeof points);
+    return kMostContactSize;
+  }
+  int packed_size(std::int32_t number) const {
+    return blocks_[(number - 1) / kBlock].field[kFlat][lane(number)] == 0 ? kContactSize : kMostContactSize;
+  }
+  std::int32_t unpack(const double* from, int* size) {
+    ContactRecord record;
+    std::memcpy(&record, from, sizeof record);
+    const bool has_flat = record.flat != 0;
+    record.flat = 0;
+    const std::int32_t number = add(record);
+    *size = kContactSize;
+    if (!has_flat) return number;
+    FlatRecord points;
+    std::memcpy(&points, from + kContactSize, sizeof points);
+    FlatContact& flat = add_flat(number);
+    flat.polygon = points.polygon;
+    flat.points.used = (1u << points.polygon.count) - 1;
+    for (int k = 0; k < kBlock; ++k) flat.points.set(k, kStateField, kContactStateSize, &points.state[k]);
+    *size = kMostContactSize;
+    return number;
   }
 
   ContactBlock& block(std::int32_t number) { return blocks_[(number - 1) / kBlock]; }
   static int lane(std::int32_t number) { return (number - 1) % kBlock; }
   LineVector<ContactBlock>& blocks() { return blocks_; }
   const LineVector<ContactBlock>& blocks() const { return blocks_; }
-  std::size_t bytes() const { return blocks_.capacity() * sizeof(ContactBlock); }
+  const LineVector<FlatContact>& flats() const { return flats_; }
+  std::size_t bytes() const {
+    return blocks_.capacity() * sizeof(ContactBlock) + flats_.capacity() * sizeof(FlatContact);
+  }
 
  private:
+  static std::int32_t take(LineVector<ContactBlock>& blocks, std::vector<std::int32_t>& free) {
+    if (free.empty()) {
+      blocks.emplace_back();
+      std::memset(static_cast<void*>(&blocks.back()), 0, sizeof(ContactBlock));
+      for (int lane = kBlock; lane-- > 0;)
+        free.push_back(static_cast<std::int32_t>(blocks.size() - 1) * kBlock + lane + 1);
+    }
+    const std::int32_t number = free.back();
+    free.pop_back();
+    blocks[(number - 1) / kBlock].used |= 1u << lane(number);
+    return number;
+  }
+
   LineVector<ContactBlock> blocks_;
   std::vector<std::int32_t> free_;
+  LineVector<FlatContact> flats_;
+  std::vector<int> free_flats_;
 };
 
 }  // namespace nurbs

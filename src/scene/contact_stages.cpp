@@ -6,6 +6,7 @@
 
 #include "laws/linear_law.h"
 #include "reference/cso.h"
+#include "scene/contact_results.h"
 
 namespace nurbs {
 namespace {
@@ -54,44 +55,7 @@ NURBS_INLINE BodyMotionOf<Wide> gather_motion(const double* const (&record)[kWid
           f[15]};
 }
 
-BodyMotion motion_of(const BodyRecord& r) {
-  BodyMotion m;
-  m.velocity = load(r.velocity);
-  m.spin = load(r.spin);
-  m.spin_before = load(r.spin_before);
-  m.inverse_mass = r.inverse_mass;
-  const double* i = r.inverse_inertia;
-  m.inverse_inertia << i[0], i[3], i[4], i[3], i[1], i[5], i[4], i[5], i[2];
-  return m;
-}
-
 }  // namespace
-
-// Of the eight contacts of a block: geometry in lab axes from A's centre of mass.
-struct alignas(64) ContactStages::Results {
-  double gap[kBlock], lower[kBlock];
-  double normal[3][kBlock], point[3][kBlock], offset[3][kBlock];  // point: midpoint of the two
-  double touching[kBlock];                                        // 1 or 0
-  double served[kBlock];
-
-  void set(int lane, const ContactResult& r, const Vec3& separation) {
-    gap[lane] = r.gap;
-    lower[lane] = r.lower;
-    touching[lane] = touches(r);
-    const Vec3 middle = 0.5 * (r.point_a + r.point_b);
-    for (int k = 0; k < 3; ++k) {
-      normal[k][lane] = r.normal[k];
-      point[k][lane] = middle[k];
-      offset[k][lane] = separation[k];
-    }
-  }
-  Vec3 normal_of(int lane) const { return {normal[0][lane], normal[1][lane], normal[2][lane]}; }
-  Vec3 offset_of(int lane) const { return {offset[0][lane], offset[1][lane], offset[2][lane]}; }
-  ContactGeometry geometry(int lane) const {
-    const Vec3 middle(point[0][lane], point[1][lane], point[2][lane]);
-    return {-gap[lane], normal_of(lane), middle, middle - offset_of(lane)};
-  }
-};
 
 void ContactCounts::add(const ContactResult& result, double weight) {
   if (result.rung != Rung::none) value[safe + static_cast<int>(result.rung) - 1] += weight;
@@ -120,17 +84,41 @@ void ContactStages::end_neighbours() {
       proof.contact = 0;
       continue;
     }
-    proof.contact = pool_.add(old.get(proof.contact));
-    ContactBlock& block = pool_.block(proof.contact);
-    const int lane = ContactPool::lane(proof.contact);
-    block.proof[lane] = &proof;
-    block.neighbour[lane] = static_cast<int>(k);
-    block.a[lane] = a_[k];
-    block.b[lane] = b_[k];
-    block.fresh[lane] = 0;
+    double record[kMostContactSize];
+    int size = 0;
+    old.pack(proof.contact, record);
+    proof.contact = pool_.unpack(record, &size);
+    bind(static_cast<int>(k));
     expiry_[k] = kInfinity;
   }
   renewed_ = true;
+}
+
+// Tells the contact of neighbour k, and its polygon, whose it is.
+void ContactStages::bind(int k) {
+  const std::int32_t number = proofs_[k]->contact;
+  const auto set = [&](ContactBlock& block, int lane) {
+    block.proof[lane] = proofs_[k];
+    block.neighbour[lane] = k;
+    block.a[lane] = a_[k];
+    block.b[lane] = b_[k];
+    block.law[lane] = 0;
+    block.fresh[lane] = 0;
+  };
+  set(pool_.block(number), ContactPool::lane(number));
+  if (FlatContact* flat = pool_.flat(number))
+    for (int lane = 0; lane < kBlock; ++lane) set(flat->points, lane);
+}
+
+void ContactStages::set_law(int k) {
+  const std::int32_t number = proofs_[k]->contact;
+  const int law = law_of(a_[k], b_[k]);
+  pool_.block(number).law[ContactPool::lane(number)] = law;
+  if (FlatContact* flat = pool_.flat(number)) std::fill_n(flat->points.law, kBlock, law);
+}
+
+ContactCoefficients ContactStages::coefficients(const ContactBlock& block, int lane) const {
+  return scaled(step_.laws[block.law[lane]], block.field[kWeight][lane]);
 }
 
 double ContactStages::path(int k) const {
@@ -169,7 +157,7 @@ void ContactStages::check_stamps() {
     }
     ContactBlock& block = pool_.block(proof.contact);
     const int lane = ContactPool::lane(proof.contact);
-    block.law[lane] = law_of(a_[k], b_[k]);
+    set_law(static_cast<int>(k));
     const std::uint64_t stamp = stamp_of(a_[k], b_[k]);
     if (proof.stamp == stamp) continue;
     PairMemory empty{};
@@ -178,6 +166,7 @@ void ContactStages::check_stamps() {
     proof = empty.proof;
     block.set(lane, 0, kLocalModelSize, &empty.model);
     block.set(lane, kLocalModelSize, 10, &empty.on_a);
+    pool_.drop_flat(proof.contact);
   }
 }
 
@@ -261,15 +250,10 @@ void ContactStages::look(int k) {
   }
   ContactRecord record{memory.model, memory.on_a, memory.on_b, {}, {0, 0, 0}, 1, 0};
   proof.contact = pool_.add(record);
-  ContactBlock& block = pool_.block(proof.contact);
-  const int lane = ContactPool::lane(proof.contact);
-  block.proof[lane] = &proof;
-  block.neighbour[lane] = k;
-  block.a[lane] = a;
-  block.b[lane] = b;
-  block.law[lane] = law_of(a, b);
+  bind(k);
+  set_law(k);
   fresh_.push_back(r);
-  block.fresh[lane] = static_cast<int>(fresh_.size());
+  pool_.block(proof.contact).fresh[ContactPool::lane(proof.contact)] = static_cast<int>(fresh_.size());
   expiry_[k] = kInfinity;
 }
 
@@ -403,6 +387,10 @@ void ContactStages::compute_block(ContactBlock& block) {
       continue;
     }
     const int a = block.a[lane], b = block.b[lane];
+    if (block.field[kFlat][lane] != 0 && serve_flat(block, lane)) {
+      results.touching[lane] = 0;
+      continue;
+    }
     const bool local = block.fresh[lane] == 0 && results.served[lane] != 0;
     if (block.fresh[lane] != 0) {
       results.set(lane, fresh_[block.fresh[lane] - 1], offset(a, b));
@@ -419,7 +407,11 @@ void ContactStages::compute_block(ContactBlock& block) {
       continue;
     }
     if (results.touching[lane] != 0) {
-      ++touching;
+      relax_weight(block, lane, results.gap[lane]);
+      if (may_be_flat(a, b) && make_flat(block, lane, results))
+        results.touching[lane] = 0;
+      else
+        ++touching;
       continue;
     }
     close(block, lane);
@@ -432,7 +424,10 @@ void ContactStages::compute_block(ContactBlock& block) {
     }
     release(block, lane, results.lower[lane]);
   }
-  if (touching == 0) return;
+  if (touching > 0) apply_law(block, results);
+}
+
+void ContactStages::apply_law(ContactBlock& block, const Results& results) {
   for (int first = 0; first < kBlock; first += kWidth)
     step_.ledger ? apply_law<true>(block, first, results) : apply_law<false>(block, first, results);
 }
@@ -443,7 +438,7 @@ void ContactStages::start_run(ContactBlock& block, int lane, const Results& resu
   const int a = block.a[lane], b = block.b[lane];
   const ContactGeometry geometry = results.geometry(lane);
   ContactState state{};
-  const ContactCoefficients& law = step_.laws[block.law[lane]];
+  const ContactCoefficients law = coefficients(block, lane);
   if (results.touching[lane] != 0) {
     block.get(lane, kStateField, kContactStateSize, &state);
     const double same = 10 * step_.settings.tolerance * smaller_radius(a, b) +
@@ -454,7 +449,6 @@ void ContactStages::start_run(ContactBlock& block, int lane, const Results& resu
   }
   block.set(lane, kStateField, kContactStateSize, &state);
   if (state.active == 0) {
-    if (results.lower[lane] > 0) release(block, lane, -kInfinity);
     return;
   }
   const Vec3 force = force_on_b(state);
@@ -477,8 +471,7 @@ void ContactStages::close(ContactBlock& block, int lane) {
   const int a = block.a[lane], b = block.b[lane];
   if (step_.ledger) {
     EnergyLedger work;
-    end_contact(step_.laws[block.law[lane]], motion_of(record(a)), motion_of(record(b)), step_.dt, state,
-                work);
+    end_contact(coefficients(block, lane), motion_of(record(a)), motion_of(record(b)), step_.dt, state, work);
     dissipated_.add(work, share(a, b));
   }
   state = ContactState{};
@@ -522,6 +515,11 @@ void ContactStages::apply_law(ContactBlock& block, int first, const Results& res
     law.ct[l] = c.ct;
     law.mu[l] = c.mu;
   }
+  const Wide weight = lanes(block, kWeight, first);
+  law.kn *= weight;
+  law.kt *= weight;
+  law.cn *= weight;
+  law.ct *= weight;
   const BodyMotionOf<Wide> a = gather_motion(of_a), b = gather_motion(of_b);
   ContactGeometryOf<Wide> g;
   g.overlap = zero - got(results.gap);
@@ -594,14 +592,14 @@ ContactStages::Sum ContactStages::total(const Accumulator& s) {
 
 ContactView ContactStages::view(const ContactBlock& block, int lane) const {
   const int a = block.a[lane], b = block.b[lane];
-  ContactView v{a, b, share(a, b), block.proof[lane], &step_.laws[block.law[lane]], {}};
+  ContactView v{a, b, share(a, b), block.proof[lane], coefficients(block, lane), {}};
   block.get(lane, kStateField, kContactStateSize, &v.state);
   return v;
 }
 
 EnergyLedger ContactStages::stored() const {
   EnergyLedger sum;
-  for_each_contact([&](const ContactView& c) { sum.add(stored_energy(*c.law, c.state), c.share); });
+  for_each_contact([&](const ContactView& c) { sum.add(stored_energy(c.law, c.state), c.share); });
   return sum;
 }
 

@@ -48,7 +48,7 @@ struct ContactView {
   int a, b;      // bodies; a < 0: the wall
   double share;  // of the contact that is this rank's: a half where one body is a ghost
   PairProof* proof;
-  const ContactCoefficients* law;
+  ContactCoefficients law;  // with the contact's share of the stiffness
   ContactState state;
 };
 
@@ -59,6 +59,7 @@ inline bool touches(const ContactResult& r) {
 
 class ContactStages {
  public:
+  struct Results;  // contact_results.h
   struct Step {
     const Bodies* bodies = nullptr;
     int owned = 0;  // bodies from here on are ghosts: they get no force, and their contacts count half
@@ -115,16 +116,18 @@ class ContactStages {
   // Calls visit(ContactView) for every touching contact.
   template <class Visit>
   void for_each_contact(Visit visit) const {
-    for (const ContactBlock& block : pool_.blocks())
+    const auto each = [&](const ContactBlock& block) {
       for (int lane = 0; lane < kBlock; ++lane)
         if ((block.used >> lane & 1) && block.field[kStateField][lane] != 0) visit(view(block, lane));
+    };
+    for (const ContactBlock& block : pool_.blocks()) each(block);
+    for (const FlatContact& flat : pool_.flats()) each(flat.points);
   }
 
  private:
   struct alignas(64) Accumulator {
     double high[8], low[8];  // force, torque, normal force, number of contacts; what was lost of them
   };
-  struct Results;
   static Sum total(const Accumulator& s);
   double share(int a, int b) const { return a < step_.owned && b < step_.owned ? 1 : 0.5; }
   ContactView view(const ContactBlock& block, int lane) const;
@@ -135,6 +138,10 @@ class ContactStages {
   Vec3 offset(int a, int b) const;
   double smaller_radius(int a, int b) const;
 
+  ContactCoefficients coefficients(const ContactBlock& block, int lane) const;
+
+  void bind(int k);
+  void set_law(int k);
   void check_stamps();
   void check_budgets();
   double proven(int k) const;
@@ -148,8 +155,19 @@ class ContactStages {
   void start_run(ContactBlock& block, int lane, const Results& results);
   void close(ContactBlock& block, int lane);
   void release(ContactBlock& block, int lane, double lower);
+  void apply_law(ContactBlock& block, const Results& results);
   template <bool ledger>
   void apply_law(ContactBlock& block, int first, const Results& results);
+
+  // Flat faces, creases and ruled lines: flat_stage.cpp.
+  bool may_be_flat(int a, int b) const;
+  bool make_flat(ContactBlock& block, int lane, const Results& single);
+  bool serve_flat(ContactBlock& block, int lane);
+  bool remake(ContactBlock& block, int lane, FlatContact& flat, PolygonState& state, double overlap);
+  void run_flat(ContactBlock& block, int lane, FlatContact& flat, const PolygonState& state);
+  void leave_flat(ContactBlock& block, int lane, FlatContact& flat, const PolygonState& state);
+  void relax_weight(ContactBlock& block, int lane, double gap);
+  void book(double energy, int a, int b);
   void add_load(int body, const double* load);
 
   // By neighbour: bodies, proof, and the sum of the bodies' paths up to which they are known to be apart;

@@ -1,0 +1,143 @@
+// Support sets (flat_faces.h): straight lines of constant normal followed across patches, and the choice
+// between face, crease, line and point.
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "body/connectivity.h"
+#include "body/flat_faces.h"
+#include "body/shape.h"
+#include "body/support.h"
+
+namespace nurbs {
+namespace {
+
+constexpr double kBesideJoint = 1e-7;  // a parameter this near 0 or 1 may belong to the neighbour
+constexpr double kStraightOn = 1e-8;   // rad, between the pieces of a line, and of their normals
+constexpr int kMostPieces = 16;        // patches that a line may cross to each side
+constexpr double kFaceCosine = 0.5;    // a face further away than 60 degrees is not asked
+
+// The same point seen through an edge on which it lies, `t` along it.
+SurfacePoint beyond(const EdgeLink& link, double t) {
+  const Vec2 at = edge_parameters(link.edge, partner_parameter(link, t));
+  return {link.patch, at[0], at[1]};
+}
+
+// Edge of a patch that ends its rulings, low or high.
+int end_edge(Ruling ruling, bool high) {
+  return (ruling == Ruling::along_u ? 0 : 2) + (high ? 1 : 0);
+}
+
+Vec3 normal_at(const Shape& shape, const SurfacePoint& at) {
+  const Jet1 j = evaluate1(shape.patches[at.patch], at.u, at.v);
+  return j.su.cross(j.sv).normalized();
+}
+
+// Follows the ruling of `at` to its low or high end, across patches while it goes straight on.
+Vec3 follow(const Shape& shape, SurfacePoint at, bool high) {
+  Vec3 end = Vec3::Zero();
+  for (int piece = 0; piece < kMostPieces; ++piece) {
+    const Ruling ruling = shape.flats.ruling[at.patch];
+    const bool along_u = ruling == Ruling::along_u;
+    SurfacePoint last = at;
+    (along_u ? last.u : last.v) = high ? 1 : 0;
+    const Vec3 from =
+        evaluate0(shape.patches[at.patch], along_u ? 1 - last.u : last.u, along_u ? last.v : 1 - last.v);
+    end = evaluate0(shape.patches[at.patch], last.u, last.v);
+    const int edge = end_edge(ruling, high);
+    const EdgeLink& link = shape.links[at.patch][edge];
+    if (link.patch < 0 || link.collapsed || std::abs(link.kink) > kSmoothKink) return end;
+    const Ruling next = shape.flats.ruling[link.patch];
+    if (next == Ruling::none) return end;
+    const bool starts_low = link.edge == end_edge(next, false);
+    if (!starts_low && link.edge != end_edge(next, true)) return end;
+    const SurfacePoint there = beyond(link, along_u ? last.v : last.u);
+    SurfacePoint far = there;
+    (next == Ruling::along_u ? far.u : far.v) = starts_low ? 1 : 0;
+    const Vec3 on = evaluate0(shape.patches[far.patch], far.u, far.v) - end;
+    if (angle_between(on, end - from) > kStraightOn) return end;
+    at = there;
+    high = starts_low;
+  }
+  return end;
+}
+
+bool line_through(const Shape& shape, SurfacePoint at, const Vec3& d, double angle, RuledLine* line) {
+  const Ruling ruling = shape.flats.ruling[at.patch];
+  if (ruling == Ruling::none) return false;
+  // The normal is the same all along; in the middle it is safe from poles.
+  (ruling == Ruling::along_u ? at.u : at.v) = 0.5;
+  if (!(angle_between(normal_at(shape, at), d) <= angle)) return false;
+  line->ends[0] = follow(shape, at, false);
+  line->ends[1] = follow(shape, at, true);
+  return true;
+}
+
+void set_point(SupportSet& set, int i, const Vec3& point, int vertex) {
+  set.point[i] = point;
+  set.vertex[i] = vertex;
+}
+
+}  // namespace
+
+bool ruled_line(const Shape& shape, const SurfacePoint& at, const Vec3& d, double angle, RuledLine* line) {
+  if (shape.flats.ruling.empty()) return false;
+  double best = -std::numeric_limits<double>::infinity();
+  const auto try_at = [&](const SurfacePoint& place) {
+    RuledLine other;
+    if (!line_through(shape, place, d, angle, &other)) return;
+    const double lowest = std::min(d.dot(other.ends[0]), d.dot(other.ends[1]));
+    if (lowest > best) best = lowest, *line = other;
+  };
+  try_at(at);
+  for (int edge = 0; edge < 4; ++edge) {
+    const double off = edge == 0 ? at.u : edge == 1 ? 1 - at.u : edge == 2 ? at.v : 1 - at.v;
+    const EdgeLink& link = shape.links[at.patch][edge];
+    if (off > kBesideJoint || link.patch < 0 || link.collapsed) continue;
+    try_at(beyond(link, edge < 2 ? at.v : at.u));
+  }
+  return best > -std::numeric_limits<double>::infinity();
+}
+
+SupportSet support_set(const Shape& shape, const Vec3& d, double tolerance) {
+  const FlatFeatures& flats = shape.flats;
+  const Support support = find_hull_support(shape, d);
+  SupportSet set;
+  set.h = support.h;
+  set.support = support.point;
+  const double least = set.h - tolerance;
+  const auto inside = [&](const Vec3& x) { return d.dot(x) >= least; };
+
+  const int f = nearest_face(flats, d, kFaceCosine);
+  if (f >= 0) {
+    const std::vector<int>& corners = flats.faces[f].corners;
+    if (std::all_of(corners.begin(), corners.end(), [&](int v) { return inside(flats.vertices[v]); })) {
+      for (const int v : corners) set_point(set, set.count++, flats.vertices[v], v);
+      set.face = f;
+      return set;
+    }
+  }
+  double best = -std::numeric_limits<double>::infinity();
+  for (const StraightEdge& edge : flats.edges) {
+    const Vec3 &p = flats.vertices[edge.ends[0]], &q = flats.vertices[edge.ends[1]];
+    if (!inside(p) || !inside(q) || d.dot(p + q) <= best) continue;
+    best = d.dot(p + q);
+    set_point(set, 0, p, edge.ends[0]);
+    set_point(set, 1, q, edge.ends[1]);
+    set.count = 2;
+  }
+  if (set.count > 0) return set;
+  RuledLine line;
+  if (ruled_line(shape, support.where, d, M_PI / 4, &line) && inside(line.ends[0]) && inside(line.ends[1])) {
+    set_point(set, 0, line.ends[0], -1);
+    set_point(set, 1, line.ends[1], -1);
+    set.count = 2;
+    set.ruled = true;
+    return set;
+  }
+  set_point(set, 0, support.point, -1);
+  set.count = 1;
+  return set;
+}
+
+}  // namespace nurbs

@@ -1,0 +1,574 @@
+// Contact polygons: made from faces, creases and ruled lines by clipping in the reference plane; evaluated
+// from frozen points.
+#include "contact/contact_polygon.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "body/flat_faces.h"
+#include "body/support.h"
+
+namespace nurbs {
+namespace {
+
+constexpr double kFaceCosine = 0.5;  // a face further than 60 degrees from the contact's normal is not asked
+constexpr double kLineAngle = 0.8;   // rad, the same for the normal of a ruled line
+constexpr double kThinnest = 1e-7;   // width to length of a polygon below which it is a segment
+constexpr double kInfinite = std::numeric_limits<double>::infinity();
+
+void store(const Vec3& v, double* out) {
+  for (int k = 0; k < 3; ++k) out[k] = v[k];
+}
+Vec3 load(const double* v) {
+  return {v[0], v[1], v[2]};
+}
+
+std::uint32_t vertex_id(int body, int vertex) {
+  return vertex < 0 ? 0 : static_cast<std::uint32_t>(1 + body) << 30 | static_cast<std::uint32_t>(vertex);
+}
+std::uint32_t crossing_id(int side_of_a, int side_of_b) {
+  return 3u << 30 | (static_cast<std::uint32_t>(side_of_a) & 0x7fffu) << 15 |
+         (static_cast<std::uint32_t>(side_of_b) & 0x7fffu);
+}
+
+// A body of the pair, placed relative to A's centre of mass.
+struct Body {
+  int index;  // 0: A, 1: B
+  const Shape* shape;
+  BodyFrame frame;
+
+  Body(int i, const Particle& p, const Vec3& origin)
+      : index(i), shape(p.shape), frame{p.scale, p.x - origin, p.q.toRotationMatrix()} {}
+  Vec3 place(const Vec3& s) const { return frame.x + frame.scale * (frame.axes * s); }
+  Vec3 to_shape(const Vec3& x) const { return frame.axes.transpose() * (x - frame.x) / frame.scale; }
+  Vec3 turned(const Vec3& s) const { return frame.axes * s; }
+  Vec3 turned_back(const Vec3& x) const { return frame.axes.transpose() * x; }
+  double radius() const { return frame.scale * shape->bounding_radius; }
+  const Vec3& vertex(int v) const { return shape->flats.vertices[v]; }
+};
+
+// The reference plane with axes of its own, lab.
+struct ReferencePlane {
+  Vec3 origin, normal, u, v;
+  double level;  // normal . (x - origin)
+
+  Vec2 project(const Vec3& x) const { return {u.dot(x - origin), v.dot(x - origin)}; }
+  double height(const Vec3& x) const { return normal.dot(x - origin) - level; }
+  Vec3 lift(const Vec2& at, double height) const {
+    return origin + at[0] * u + at[1] * v + (level + height) * normal;
+  }
+};
+
+// Points on their way into a polygon: in the plane, and on the incident body.
+struct Candidates {
+  ConvexPolygon plane;                 // a segment when count is 2
+  Vec3 on_body[ConvexPolygon::kMost];  // shape axes, scale 1
+  double gap[ConvexPolygon::kMost];
+  std::uint32_t id[ConvexPolygon::kMost];
+
+  void add(const Vec2& at, const Vec3& point, double height, std::uint32_t name) {
+    on_body[plane.count] = point;
+    gap[plane.count] = height;
+    id[plane.count] = name;
+    plane.add(at, 0, 0);
+  }
+  bool within(double most) const {
+    return std::all_of(gap, gap + plane.count, [&](double g) { return g <= most; });
+  }
+};
+
+double size_of(const ConvexPolygon& p, int* first, int* second) {
+  double most = 0;
+  for (int i = 0; i < p.count; ++i)
+    for (int j = i + 1; j < p.count; ++j) {
+      const double d = (p.corner[i] - p.corner[j]).squaredNorm();
+      if (d <= most) continue;
+      most = d;
+      *first = i;
+      *second = j;
+    }
+  return std::sqrt(most);
+}
+
+void set_point(const Candidates& from, int i, double weight, ContactPolygon* out) {
+  store(from.on_body[i], out->point[out->count]);
+  out->weight[out->count] = weight;
+  out->id[out->count++] = from.id[i];
+}
+
+// Thins and weighs; false when all of it is smaller than `least`. `centre`: of the load, null: the centroid.
+bool finish(const Candidates& from, double overlap, double least, const Vec2* centre, ContactPolygon* out) {
+  out->count = 0;
+  int first = 0, second = 0;
+  const double size = from.plane.count > 1 ? size_of(from.plane, &first, &second) : 0;
+  if (!(size > least)) return false;
+  if (from.plane.count == 2 || polygon_area(from.plane) <= kThinnest * size * size) {
+    set_point(from, first, 0.5, out);
+    set_point(from, second, 0.5, out);
+    return true;
+  }
+  const double* const end = from.gap + from.plane.count;
+  const double* const deepest = std::min_element(from.gap, end);
+  const bool tilted = *std::max_element(from.gap, end) - *deepest > kLeadShare * overlap;
+  int kept[ConvexPolygon::kMost];
+  const int count = thin(from.plane, kContactPoints, tilted ? static_cast<int>(deepest - from.gap) : 0,
+                         tilted ? kLeadNeighbours : 0, kept);
+  ConvexPolygon few;
+  for (int i = 0; i < count; ++i) few.add(from.plane.corner[kept[i]], 0, 0);
+  double weight[ConvexPolygon::kMost];
+  corner_weights(few, centre ? *centre : polygon_centroid(from.plane), weight);
+  for (int i = 0; i < count; ++i) set_point(from, kept[i], weight[i], out);
+  return true;
+}
+
+// What remains to be filled in once the points stand: the marks that tell sliding.
+void set_marks(const BodyFrame& reference, const BodyFrame& incident, ContactPolygon* out) {
+  const auto in_reference = [&](int i) -> Vec3 {
+    const Vec3 x = incident.x + incident.scale * (incident.axes * load(out->point[i]));
+    return reference.axes.transpose() * (x - reference.x);
+  };
+  const Vec3 zero = in_reference(0);
+  double most = 0;
+  out->far = 0;
+  for (int i = 1; i < out->count; ++i) {
+    const double d = (in_reference(i) - zero).squaredNorm();
+    if (d > most) most = d, out->far = i;
+  }
+  store(zero, out->mark[0]);
+  store(in_reference(out->far), out->mark[1]);
+}
+
+double gap_below(const Body& incident, const ReferencePlane& plane) {
+  const double h = find_hull_support(*incident.shape, incident.turned_back(-plane.normal)).h;
+  return plane.normal.dot(incident.frame.x - plane.origin) - incident.frame.scale * h - plane.level;
+}
+
+// A round outline is inscribed: the corner of it (shape axes) next to the support point moves there, provided
+// that the point lies within `tolerance` of the face's plane and next to the outline. A body that leans
+// stands on it.
+void move_corner_to(const Vec3& support, const FlatFace& face, double tolerance, Vec3* outline, int count) {
+  if (face.offset - face.normal.dot(support) > tolerance) return;
+  int nearest = 0;
+  for (int i = 1; i < count; ++i)
+    if ((outline[i] - support).squaredNorm() < (outline[nearest] - support).squaredNorm()) nearest = i;
+  const Vec3& next = outline[nearest + 1 < count ? nearest + 1 : 0];
+  if ((support - outline[nearest]).squaredNorm() > (next - outline[nearest]).squaredNorm()) return;
+  outline[nearest] = support;
+}
+
+// The corners of a face, shape axes, from outside: moved as above when the face is round and the body leans.
+// `height`(s): of a point above the plane it stands on, `support`(): the support point towards it.
+template <class Height, class Support>
+int standing_outline(const Shape& shape, const FlatFace& face, double overlap, double tolerance,
+                     const Height& height, const Support& support, Vec3* outline) {
+  int count = 0;
+  double least = kInfinite, most = -kInfinite;
+  for (const int v : face.outline) {
+    outline[count++] = shape.flats.vertices[v];
+    least = std::min(least, height(shape.flats.vertices[v]));
+    most = std::max(most, height(shape.flats.vertices[v]));
+  }
+  if (face.round && most - least > kLeadShare * overlap)
+    move_corner_to(support(), face, tolerance, outline, count);
+  return count;
+}
+
+// One attempt at a pair's polygon with a given face as the reference.
+class FaceContact {
+ public:
+  FaceContact(const Body& reference, const FlatFace& face, const Body& incident)
+      : reference_(reference), face_(face), incident_(incident) {
+    plane_ = {reference.frame.x, reference.turned(face.normal), reference.turned(face.axis_u),
+              reference.turned(face.axis_v()), reference.frame.scale * face.offset};
+    slack_ = kClipSlack * std::max(reference.radius(), incident.radius());
+  }
+
+  double deepest_gap() const { return gap_below(incident_, plane_); }
+
+  // `swallowed`: the reference face lies inside the incident one.
+  bool make(double overlap, double reach, ContactPolygon* out, bool* swallowed) {
+    for (const int v : face_.outline)
+      window_.add(plane_.project(reference_.place(reference_.vertex(v))), 0, 0);
+    *swallowed = false;
+    const double most = reach - overlap;
+    if (!face_points(overlap, reach, swallowed) && !crease_points(most) && !line_points(most)) return false;
+    if (!finish(points_, overlap, reach, nullptr, out)) return false;
+    out->reference = reference_.index;
+    out->rolling = rolling_;
+    out->factor = 1;
+    store(face_.normal, out->normal);
+    out->offset = face_.offset;
+    set_marks(reference_.frame, incident_.frame, out);
+    set_room(out);
+    return true;
+  }
+
+ private:
+  std::uint32_t crossing(int side_of_reference, int side_of_incident) const {
+    return reference_.index == 0 ? crossing_id(side_of_reference, side_of_incident)
+                                 : crossing_id(side_of_incident, side_of_reference);
+  }
+
+  bool face_points(double overlap, double reach, bool* swallowed) {
+    const FlatFeatures& flats = incident_.shape->flats;
+    const int f = nearest_face(flats, incident_.turned_back(-plane_.normal), kFaceCosine);
+    if (f < 0) return false;
+    const FlatFace& face = flats.faces[f];
+    // Counterclockwise seen from the incident body's outside is clockwise about the reference's normal.
+    const int n = static_cast<int>(face.outline.size());
+    const auto vertex = [&](int i) { return face.outline[n - 1 - i % n]; };
+    Vec3 outline[kOutlinePoints];
+    standing_outline(
+        *incident_.shape, face, overlap, reach / incident_.frame.scale,
+        [&](const Vec3& s) { return plane_.height(incident_.place(s)); },
+        [&] { return find_hull_support(*incident_.shape, incident_.turned_back(-plane_.normal)).point; },
+        outline);
+    ConvexPolygon subject;
+    for (int i = 0; i < n; ++i) subject.add(plane_.project(incident_.place(outline[n - 1 - i])), 0, 0);
+    const ConvexPolygon cut = intersect(subject, window_, slack_);
+    if (cut.count < 3) return false;
+    const Vec3 normal = incident_.turned(face.normal);
+    const double level = incident_.frame.scale * face.offset - normal.dot(plane_.origin - incident_.frame.x);
+    points_.plane.count = 0;
+    whole_ = true;
+    *swallowed = true;
+    for (int i = 0; i < cut.count; ++i) {
+      const int b = cut.before(i);
+      const bool own = cut.owner[b] == 0 && cut.owner[i] == 0,
+                 others = cut.owner[b] == 1 && cut.owner[i] == 1;
+      whole_ = whole_ && own;
+      *swallowed = *swallowed && others;
+      if (own) {
+        const int v = vertex(cut.side[i]);
+        const Vec3& point = outline[n - 1 - cut.side[i]];
+        points_.add(cut.corner[i], point, plane_.height(incident_.place(point)),
+                    vertex_id(incident_.index, v));
+        continue;
+      }
+      const Vec2& at = cut.corner[i];
+      const double height =
+          (level - at[0] * normal.dot(plane_.u) - at[1] * normal.dot(plane_.v)) / normal.dot(plane_.normal) -
+          plane_.level;
+      std::uint32_t id = 0;
+      if (others) {
+        id = vertex_id(reference_.index, face_.outline[cut.side[i]]);
+      } else {
+        const int mine = cut.owner[b] == 0 ? cut.side[b] : cut.side[i];
+        const int other = cut.owner[b] == 1 ? cut.side[b] : cut.side[i];
+        id = crossing(face_.outline[other],
+                      vertex(mine + 1));  // a side is named by where it starts from outside
+      }
+      points_.add(at, incident_.to_shape(plane_.lift(at, height)), height, id);
+    }
+    return points_.within(reach - overlap);
+  }
+
+  // The part of a segment of the incident body over the reference face; false unless it is within reach.
+  bool segment(const Vec3 (&ends)[2], const int (&vertex)[2], double most, Candidates* out,
+               bool* uncut) const {
+    const Vec3 p = incident_.place(ends[0]), q = incident_.place(ends[1]);
+    const double gap_p = plane_.height(p), gap_q = plane_.height(q);
+    if (std::min(gap_p, gap_q) > most) return false;
+    const Vec2 at_p = plane_.project(p), at_q = plane_.project(q);
+    SegmentPart part;
+    if (!clip_segment(window_, at_p, at_q, slack_, &part)) return false;
+    out->plane.count = 0;
+    const auto add = [&](double t, int side, int end) {
+      const std::uint32_t id = vertex[end] < 0 ? 0
+                               : side < 0      ? vertex_id(incident_.index, vertex[end])
+                                               : crossing(face_.outline[side], vertex[0]);
+      out->add(at_p + t * (at_q - at_p), ends[0] + t * (ends[1] - ends[0]), gap_p + t * (gap_q - gap_p), id);
+    };
+    add(part.t0, part.side0, 0);
+    add(part.t1, part.side1, 1);
+    *uncut = part.side0 < 0 && part.side1 < 0;
+    return out->within(most);
+  }
+
+  bool crease_points(double most) {
+    bool found = false;
+    for (const StraightEdge& edge : incident_.shape->flats.edges) {
+      Candidates other;
+      bool uncut = false;
+      if (!segment({incident_.vertex(edge.ends[0]), incident_.vertex(edge.ends[1])}, edge.ends, most, &other,
+                   &uncut))
+        continue;
+      if (found && other.gap[0] + other.gap[1] >= points_.gap[0] + points_.gap[1]) continue;
+      found = true;
+      whole_ = uncut;
+      copy_segment(other);
+    }
+    return found;
+  }
+
+  void copy_segment(const Candidates& other) {
+    points_.plane.count = 0;
+    for (int i = 0; i < 2; ++i)
+      points_.add(other.plane.corner[i], other.on_body[i], other.gap[i], other.id[i]);
+  }
+
+  bool line_points(double most) {
+    const Vec3 d = incident_.turned_back(-plane_.normal);
+    const Shape& shape = *incident_.shape;
+    RuledLine line;
+    if (shape.flats.ruling.empty() ||
+        !ruled_line(shape, find_hull_support(shape, d).where, d, kLineAngle, &line) ||
+        !segment(line.ends, {-1, -1}, most, &points_, &whole_))
+      return false;
+    rolling_ = 1;
+    return true;
+  }
+
+  void set_room(ContactPolygon* out) const {
+    int i = 0, j = 0;
+    double room = kSlideShare * size_of(points_.plane, &i, &j);
+    if (whole_) {
+      double margin = kInfinite;
+      for (int k = 0; k < points_.plane.count; ++k)
+        margin = std::min(margin, depth_inside(window_, points_.plane.corner[k]));
+      room = std::max(room, margin);
+    }
+    out->room = room;
+  }
+
+  const Body& reference_;
+  const FlatFace& face_;
+  const Body& incident_;
+  ReferencePlane plane_;
+  double slack_;
+  ConvexPolygon window_;  // the reference's outline
+  Candidates points_;
+  bool whole_ = false;  // every point is the incident body's own
+  int rolling_ = 0;
+};
+
+// A crease or ruled line of a body that supports it in lab direction d, to `tolerance`.
+struct Line {
+  Vec3 ends[2];  // lab, from A's centre of mass
+  int vertex[2];
+  bool ruled;
+};
+
+bool support_line(const Body& body, const Vec3& d, double tolerance, Line* line) {
+  const SupportSet set = support_set(*body.shape, body.turned_back(d), tolerance / body.frame.scale);
+  if (set.count != 2) return false;
+  for (int i = 0; i < 2; ++i) {
+    line->ends[i] = body.place(set.point[i]);
+    line->vertex[i] = set.vertex[i];
+  }
+  line->ruled = set.ruled;
+  return true;
+}
+
+// Two parallel lines: the reference plane goes through A's, as square to the contact's normal as it can.
+bool line_contact(const Body& a, const Body& b, const Vec3& d, double overlap, double reach,
+                  ContactPolygon* out) {
+  Line on_a, on_b;
+  if (!support_line(a, d, reach, &on_a) || !support_line(b, -d, reach, &on_b)) return false;
+  const Vec3 u = (on_a.ends[1] - on_a.ends[0]).normalized();
+  const Vec3 normal = (d - d.dot(u) * u).normalized();
+  const ReferencePlane plane{on_a.ends[0], normal, u, normal.cross(u), 0};
+  const double length = u.dot(on_a.ends[1] - on_a.ends[0]);
+  const Vec2 p = plane.project(on_b.ends[0]), q = plane.project(on_b.ends[1]);
+  // Lines further apart sideways than this touch at one point.
+  if (std::max(std::abs(p[1]), std::abs(q[1])) > reach) return false;
+  Candidates points;
+  bool whole = true;
+  for (int i = 0; i < 2; ++i) {
+    const Vec2 &mine = i == 0 ? p : q, &other = i == 0 ? q : p;
+    const double at = std::clamp(mine[0], 0.0, length);
+    const bool cut = at != mine[0];
+    const double t = cut ? (at - mine[0]) / (other[0] - mine[0]) : 0;
+    if (!(t >= 0 && t < 1)) return false;
+    whole = whole && !cut;
+    const Vec3 x = on_b.ends[i] + t * (on_b.ends[1 - i] - on_b.ends[i]);
+    points.add(plane.project(x), b.to_shape(x), plane.height(x),
+               cut ? vertex_id(0, on_a.vertex[at > 0 ? 1 : 0]) : vertex_id(1, on_b.vertex[i]));
+  }
+  if (!points.within(reach - overlap) || !finish(points, overlap, reach, nullptr, out)) return false;
+  out->reference = 0;
+  out->rolling = on_a.ruled || on_b.ruled ? 1 : 0;
+  out->factor = 1;
+  const Vec3 local = a.turned_back(normal);
+  store(local, out->normal);
+  out->offset = local.dot(a.to_shape(on_a.ends[0]));
+  set_marks(a.frame, b.frame, out);
+  out->room = kSlideShare * length;
+  return true;
+}
+
+}  // namespace
+
+BodyFrame body_frame(const Particle& particle) {
+  return {particle.scale, particle.x, particle.q.toRotationMatrix()};
+}
+
+BodyFrame plane_frame(const Vec3& origin) {
+  return {1, origin, Mat3::Identity()};
+}
+
+bool make_plane_polygon(const Particle& particle, const Vec3& origin, const Vec3& normal, double overlap,
+                        double reach, ContactPolygon* out) {
+  *out = {};
+  const Shape& shape = *particle.shape;
+  if (shape.flats.empty()) return false;
+  const BodyFrame frame = body_frame(particle);
+  const SupportSet set = support_set(shape, frame.axes.transpose() * -normal, reach / frame.scale);
+  if (set.count < 2) return false;
+  const auto height = [&](const Vec3& s) {
+    return normal.dot(particle.x - origin + frame.scale * (frame.axes * s));
+  };
+  Candidates points;
+  Vec2 centre = Vec2::Zero();
+  const bool face = set.face >= 0;
+  if (face) {
+    const FlatFace& f = shape.flats.faces[set.face];
+    Vec3 outline[kOutlinePoints];
+    const int count = standing_outline(
+        shape, f, overlap, reach / frame.scale, height, [&] { return set.support; }, outline);
+    for (int i = 0; i < count; ++i)
+      points.add(f.project(outline[i]), outline[i], height(outline[i]), vertex_id(1, f.outline[i]));
+    centre = f.project(f.centroid);
+  } else {
+    const double length = (set.point[1] - set.point[0]).norm();
+    for (int i = 0; i < 2; ++i)
+      points.add({i * length, 0}, set.point[i], height(set.point[i]), vertex_id(1, set.vertex[i]));
+  }
+  if (!finish(points, overlap, reach / frame.scale, face ? &centre : nullptr, out)) return false;
+  out->rolling = set.ruled ? 1 : 0;
+  out->factor = 1;
+  store(normal, out->normal);
+  out->room = kInfinite;
+  set_marks(plane_frame(origin), frame, out);
+  return true;
+}
+
+bool make_pair_polygon(const Particle& pa, const Particle& pb, const Vec3& normal, double overlap,
+                       double reach, const ContactPolygon* old, ContactPolygon* out) {
+  *out = {};
+  if (pa.shape->flats.empty() || pb.shape->flats.empty()) return false;
+  const Body a(0, pa, pa.x), b(1, pb, pa.x);
+  const int face_a = nearest_face(a.shape->flats, a.turned_back(normal), kFaceCosine);
+  const int face_b = nearest_face(b.shape->flats, b.turned_back(-normal), kFaceCosine);
+  double depth[2] = {kInfinite, kInfinite};  // along the normals of the two faces
+  if (face_a >= 0) depth[0] = -FaceContact(a, a.shape->flats.faces[face_a], b).deepest_gap();
+  if (face_b >= 0) depth[1] = -FaceContact(b, b.shape->flats.faces[face_b], a).deepest_gap();
+  const double most = overlap + reach;
+  int first = old && old->count > 0 && old->reference == 1 ? 1 : 0;
+  if (!(depth[first] <= most) || depth[1 - first] < depth[first] - kReferenceShare * overlap)
+    first = 1 - first;
+
+  const auto attempt = [&](int reference, ContactPolygon* polygon, bool* swallowed) {
+    if (!(depth[reference] <= most)) return false;
+    const Body &owner = reference == 0 ? a : b, &other = reference == 0 ? b : a;
+    const FlatFace& face = owner.shape->flats.faces[reference == 0 ? face_a : face_b];
+    return FaceContact(owner, face, other).make(overlap, reach, polygon, swallowed);
+  };
+  bool swallowed = false;
+  if (attempt(first, out, &swallowed)) {
+    ContactPolygon other = {};
+    bool again = false;
+    if (swallowed && attempt(1 - first, &other, &again) && !again) *out = other;
+    return true;
+  }
+  if (attempt(1 - first, out, &swallowed)) return true;
+  if (line_contact(a, b, normal, overlap, reach, out)) return true;
+  *out = {};
+  return false;
+}
+
+PolygonState evaluate(const ContactPolygon& polygon, const BodyFrame& a, const BodyFrame& b) {
+  PolygonState state;
+  state.count = polygon.count;
+  const bool a_is_reference = polygon.reference == 0;
+  const BodyFrame &reference = a_is_reference ? a : b, &incident = a_is_reference ? b : a;
+  const Vec3 outward = reference.axes * load(polygon.normal);
+  state.normal = a_is_reference ? outward : Vec3(-outward);
+  // Relative to the reference's centre, so that bodies far from the lab's origin keep their digits.
+  const Vec3 apart = incident.x - reference.x;
+  const double level = reference.scale * polygon.offset;
+  state.least = kInfinite;
+  state.most = -kInfinite;
+  for (int i = 0; i < polygon.count; ++i) {
+    const Vec3 arm = incident.scale * (incident.axes * load(polygon.point[i]));
+    const double gap = outward.dot(apart + arm) - level;
+    const Vec3 middle = arm - 0.5 * gap * outward;
+    state.gap[i] = gap;
+    (a_is_reference ? state.arm_b : state.arm_a)[i] = middle;
+    (a_is_reference ? state.arm_a : state.arm_b)[i] = middle + apart;
+    state.least = std::min(state.least, gap);
+    state.most = std::max(state.most, gap);
+  }
+  if (polygon.count > 0 && polygon.room < kInfinite) {
+    const auto lateral = [&](int i, const double* mark) {
+      const Vec3 x =
+          apart + incident.scale * (incident.axes * load(polygon.point[i])) - reference.axes * load(mark);
+      return (x - outward.dot(x) * outward).norm();
+    };
+    state.slid = 2 * lateral(0, polygon.mark[0]) + lateral(polygon.far, polygon.mark[1]);
+  }
+  return state;
+}
+
+PolygonVerdict judge(const ContactPolygon& polygon, const PolygonState& state) {
+  if (!(state.least < 0)) return PolygonVerdict::open;
+  if (polygon.rolling != 0 || state.slid > polygon.room) return PolygonVerdict::moved;
+  return state.most > 0 || polygon.count == 2 ? PolygonVerdict::tilted : PolygonVerdict::keep;
+}
+
+double support_gap(const ContactPolygon& polygon, const Particle* a, const Particle& b, const Vec3& origin) {
+  const bool b_is_reference = polygon.reference == 1;
+  const Particle& incident = b_is_reference ? *a : b;
+  const Particle* reference = b_is_reference ? &b : a;
+  Vec3 outward = load(polygon.normal);
+  if (reference) outward = reference->q * outward;
+  const Vec3 apart = incident.x - (reference ? reference->x : origin);
+  const double level = (reference ? reference->scale : 1) * polygon.offset;
+  const double h = find_hull_support(*incident.shape, incident.q.conjugate() * -outward).h;
+  return outward.dot(apart) - incident.scale * h - level;
+}
+
+bool outgrown(const PolygonState& state, double support_gap) {
+  return support_gap < state.least + kOutgrownShare * std::min(0.0, state.least);
+}
+
+double stored_energy(const ContactPolygon& polygon, const PolygonState& state) {
+  double sum = 0;
+  for (int i = 0; i < polygon.count; ++i) {
+    const double overlap = std::max(0.0, -state.gap[i]);
+    sum += polygon.weight[i] * overlap * overlap;
+  }
+  return 0.5 * polygon.factor * sum;
+}
+
+double continuity_factor(double energy, const ContactPolygon& polygon, const PolygonState& state) {
+  ContactPolygon unit = polygon;
+  unit.factor = 1;
+  const double full = stored_energy(unit, state);
+  return energy > 0 && full > 0 ? energy / full : 1;
+}
+
+double relax(ContactPolygon& polygon, const PolygonState& state, double share) {
+  const double before = stored_energy(polygon, state);
+  polygon.factor += share * (1 - polygon.factor);
+  return stored_energy(polygon, state) - before;
+}
+
+void match(const ContactPolygon& old_polygon, const PolygonState& old_state,
+           const ContactPolygon& new_polygon, const PolygonState& new_state, int* source) {
+  for (int i = 0; i < new_polygon.count; ++i) {
+    source[i] = -1;
+    double least = kInfinite;
+    for (int j = 0; j < old_polygon.count; ++j) {
+      if (new_polygon.id[i] != 0 && new_polygon.id[i] == old_polygon.id[j]) {
+        source[i] = j;
+        break;
+      }
+      const double d = (new_state.arm_a[i] - old_state.arm_a[j]).squaredNorm();
+      if (d < least) least = d, source[i] = j;
+    }
+  }
+}
+
+}  // namespace nurbs

@@ -1,0 +1,144 @@
+// Several contacts of one pair: where flat faces, creases or ruled lines meet a plane or each other, the
+// contact is a polygon of up to eight points with frozen places and weights,
+//
+//     U = factor kn sum_i w_i min(0, gap_i)^2 / 2,        sum_i w_i = 1.
+//
+// One body (or the plane) is the *reference*: it owns a plane and its normal. The other one is *incident*: it
+// owns the points. (Box2D's and Bullet's reference face; there points are remade every step, here they stay,
+// as otherwise U is no function of the poses.) gap_i is the distance of the body-fixed point i from the
+// body-fixed plane, so that the force factor w_i kn |gap_i| along the normal, acting on both bodies at the
+// same place, is exactly - dU/d(pose) of both, rotation of the reference body included.
+//
+// Conventions as in contact.h: the normal points from A to B, gaps are negative in overlap; for a plane A is
+// the plane. Shape axes and scale 1 inside ContactPolygon, lab axes and lengths outside. Nothing here
+// allocates, throws or prints.
+//
+// Life of a contact, by the caller:
+//  1. Single point (ladder) with overlap delta > 0: try make_*_polygon with reach = max(kReach delta, a
+//  typical
+//     overlap). count = 0: stay with the single point. Asking at the first touch is best: U is then nothing.
+//  2. Hand-over: polygon.factor = continuity_factor(U before / kn, polygon, state) keeps U continuous. Later
+//     relax(polygon, state, dt / time) moves it to 1 and returns the work / kn that this puts into the
+//     springs
+//     (< 0: dissipated), to be booked. Factors above 1 (a corner that comes down flat: up to 4) relax at
+//     once; those below 1 would need work: let them be until the contact opens, or relax them while the
+//     damper dissipates more. A contact that opens (U = 0) starts again with 1.
+//  3. Every step: evaluate, then judge.
+//       keep:   forces from the state.
+//       open:   no point overlaps. Back to the single point and to 1.
+//       moved:  the points slid over the reference outline by more than `room`, or the polygon belongs to a
+//       ruled
+//               line, which rolls: remake. Book the jump stored_energy(new) - stored_energy(old), or take it
+//               up in the factor. It is of second order: none under a uniform gap, whatever the weights.
+//       tilted: some points are open, or it stands on a crease, so the body may touch elsewhere: compare with
+//               support_gap (one support search) by outgrown(); only if that says so, remake. Where all
+//               points of a face are closed it can't be: beside a face the body falls away, and an octagon
+//               lacks 8 % of a rim's tilt at most.
+//     A remake that yields count = 0 hands back to the single point with factor continuity.
+//  4. match() tells from which old point every new one inherits its history (a spring xi_i is a displacement,
+//  the
+//     force w_i kt xi_i: copying it keeps the sum under a plain slide, whatever the weights).
+#pragma once
+
+#include <cstdint>
+#include <type_traits>
+
+#include "body/convex_polygon.h"
+#include "contact/contact.h"
+
+namespace nurbs {
+
+// --- tolerances
+constexpr double kReach = 3;          // overlaps by which points of one feature may lag behind the deepest.
+                                      // Statics needs 1: on the brink of tipping the far side is just open
+constexpr double kSlideShare = 1e-3;  // of the polygon's size that cut points may slide before a remake: a
+                                      // jump of the torque by 5e-4, of U by 1e-7
+constexpr double kReferenceShare = 0.05;  // of the overlap by which the other face must be the shallower one
+                                          // to become the reference
+constexpr double kOutgrownShare = 0.1;    // of the overlap by which the body may be deeper than its points
+constexpr double kLeadShare = 0.1;   // lag, in overlaps, above which a body counts as leaning: a round face
+                                     // then keeps its deepest point and ...
+constexpr int kLeadNeighbours = 2;   // ... these beside it: it tips over its rim, not over an octagon
+constexpr double kClipSlack = 1e-9;  // of the larger bounding radius: places that count as equal
+
+struct ContactPolygon {
+  std::int32_t count;               // 0: none; 2: a segment; 3 to 8: in order around the polygon
+  std::int32_t reference;           // 0: A (or the plane), 1: B
+  std::int32_t rolling;             // 1: remake every step, the points follow a ruled line
+  std::int32_t far;                 // the point furthest from point 0
+  double normal[3];                 // outward, of the reference plane, in its shape axes (a plane: lab axes)
+  double offset;                    // normal . x of that plane, scale 1 (a plane: 0, from its origin)
+  double factor;                    // see above; 1 unless set by the caller
+  double room;                      // lateral motion until it must be remade, length
+  double mark[2][3];                // points 0 and `far` in the reference's axes when made, length
+  double point[kContactPoints][3];  // incident shape axes, scale 1
+  double weight[kContactPoints];    // sum 1
+  std::uint32_t
+      id[kContactPoints];  // which vertices or edges made it, the same for either reference; 0 unknown
+};
+static_assert(std::is_trivially_copyable_v<ContactPolygon> && sizeof(ContactPolygon) == 400);
+
+// A placed body as evaluation needs it; a plane is one with scale 1 and the lab's axes at its origin.
+struct BodyFrame {
+  double scale = 1;
+  Vec3 x = Vec3::Zero();
+  Mat3 axes = Mat3::Identity();  // shape into lab
+};
+BodyFrame body_frame(const Particle& particle);
+BodyFrame plane_frame(const Vec3& origin);
+
+// The contact of a particle (B) with the plane through `origin` with unit `normal` towards the particle (A).
+// `overlap` is that of the deepest point. The face, crease or ruled line takes part whole if all its points
+// have gap <= reach - overlap; false and count = 0 where none does. A round face gives eight points of its
+// rim, one of them the deepest point when the body is tilted. About 2 us.
+bool make_plane_polygon(const Particle& particle, const Vec3& origin, const Vec3& normal, double overlap,
+                        double reach, ContactPolygon* out);
+
+// The contact of two particles touching with `normal` (A to B, lab) and `overlap`, as the ladder found them;
+// the normal need only be good to some degrees, as the faces supply theirs. Candidates for the reference are
+// the face of each body nearest to the normal, if the overlap along its normal is at most overlap + reach;
+// the shallower one is taken (separating axis), within kReferenceShare the one `old` (may be null) had, else
+// A, except that a face lying inside the other is incident. The incident face is clipped by the reference's
+// outline; if its clipped points are not all within reach, a crease, then a ruled line of the incident body,
+// is clipped instead. Without a face, two parallel lines give the segment they share, with A's line in the
+// reference plane. Crossing edges, and corners on faces, are single points: false, count = 0. 2 to 15 us, two
+// support searches of which on rounded bodies are the most.
+bool make_pair_polygon(const Particle& a, const Particle& b, const Vec3& normal, double overlap, double reach,
+                       const ContactPolygon* old, ContactPolygon* out);
+
+// Where the points are now.
+struct PolygonState {
+  int count = 0;
+  Vec3 normal;  // A to B, lab
+  double gap[kContactPoints];
+  Vec3 arm_a[kContactPoints];  // midpoint between point and plane from A's centre (the plane's origin) ...
+  Vec3 arm_b[kContactPoints];  // ... and from B's; lab axes
+  double least = 0, most = 0;  // of the gaps
+  double slid = 0;             // bound on any point's lateral motion over the reference since it was made
+};
+// About 10 ns a point.
+PolygonState evaluate(const ContactPolygon& polygon, const BodyFrame& a, const BodyFrame& b);
+
+enum class PolygonVerdict { keep, open, moved, tilted };
+PolygonVerdict judge(const ContactPolygon& polygon, const PolygonState& state);
+
+// Gap of the incident body's deepest point below the reference plane: one support search, 0.3 to 2 us. `a`
+// null for a plane, whose origin is `origin`.
+double support_gap(const ContactPolygon& polygon, const Particle* a, const Particle& b,
+                   const Vec3& origin = Vec3::Zero());
+// Whether the incident body touches deeper than the points say.
+bool outgrown(const PolygonState& state, double support_gap);
+
+// U / kn, the factor included.
+double stored_energy(const ContactPolygon& polygon, const PolygonState& state);
+// The factor that gives the polygon the energy U / kn; 1 where one of the two has none.
+double continuity_factor(double energy, const ContactPolygon& polygon, const PolygonState& state);
+// Moves the factor to 1 by `share` in [0, 1] of its distance; returns the change of U / kn.
+double relax(ContactPolygon& polygon, const PolygonState& state, double share);
+
+// For every point of the new polygon the old one whose history it takes over: that of the same id, else the
+// nearest in the lab. Always one, as long as the old polygon has points; several may share one.
+void match(const ContactPolygon& old_polygon, const PolygonState& old_state,
+           const ContactPolygon& new_polygon, const PolygonState& new_state, int* source);
+
+}  // namespace nurbs

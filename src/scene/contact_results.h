@@ -1,0 +1,46 @@
+// What the stages of a step hand on to each other about the eight contacts of a block.
+#pragma once
+
+#include "scene/contact_stages.h"
+
+namespace nurbs {
+
+// A body as the law sees it.
+inline BodyMotion motion_of(const BodyRecord& r) {
+  BodyMotion m;
+  m.velocity = load(r.velocity);
+  m.spin = load(r.spin);
+  m.spin_before = load(r.spin_before);
+  m.inverse_mass = r.inverse_mass;
+  const double* i = r.inverse_inertia;
+  m.inverse_inertia << i[0], i[3], i[4], i[3], i[1], i[5], i[4], i[5], i[2];
+  return m;
+}
+
+// Geometry in lab axes from A's centre of mass.
+struct alignas(64) ContactStages::Results {
+  double gap[kBlock], lower[kBlock];
+  double normal[3][kBlock], point[3][kBlock], offset[3][kBlock];  // point: midpoint of the two
+  double touching[kBlock];                                        // 1 or 0
+  double served[kBlock];
+
+  void set(int lane, const ContactResult& r, const Vec3& separation) {
+    gap[lane] = r.gap;
+    lower[lane] = r.lower;
+    touching[lane] = touches(r);
+    const Vec3 middle = 0.5 * (r.point_a + r.point_b);
+    for (int k = 0; k < 3; ++k) {
+      normal[k][lane] = r.normal[k];
+      point[k][lane] = middle[k];
+      offset[k][lane] = separation[k];
+    }
+  }
+  Vec3 normal_of(int lane) const { return {normal[0][lane], normal[1][lane], normal[2][lane]}; }
+  Vec3 offset_of(int lane) const { return {offset[0][lane], offset[1][lane], offset[2][lane]}; }
+  ContactGeometry geometry(int lane) const {
+    const Vec3 middle(point[0][lane], point[1][lane], point[2][lane]);
+    return {-gap[lane], normal_of(lane), middle, middle - offset_of(lane)};
+  }
+};
+
+}  // namespace nurbs

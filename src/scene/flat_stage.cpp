@@ -1,0 +1,266 @@
+// The contacts of pairs whose flat faces, creases or ruled lines meet: several points with frozen weights, as
+// contact/contact_polygon.h describes their life. A pair has either its one contact or those of a polygon.
+#include <algorithm>
+#include <cmath>
+
+#include "scene/contact_results.h"
+
+namespace nurbs {
+namespace {
+
+// Of its distance to 1 that a factor above it moves in a step: a corner that has come down flat is up to four
+// times too stiff, and the spring energy that it gives up is booked.
+constexpr double kRelaxation = 2e-3;
+
+BodyFrame frame_of(const BodyRecord& r, double scale) {
+  BodyFrame f;
+  f.scale = scale;
+  f.x = load(r.x);
+  f.axes = Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(r.turn);
+  return f;
+}
+
+void fill(const ContactPolygon& polygon, const PolygonState& state, const Vec3& offset, ContactBlock* points,
+          ContactStages::Results* results) {
+  for (int k = 0; k < kBlock; ++k) {
+    const bool there = k < state.count;
+    points->field[kWeight][k] = there ? polygon.factor * polygon.weight[k] : 0;
+    results->gap[k] = results->lower[k] = there ? state.gap[k] : 1;
+    results->touching[k] = there && state.gap[k] < 0;
+    for (int i = 0; i < 3; ++i) {
+      results->normal[i][k] = state.normal[i];
+      results->point[i][k] = there ? state.arm_a[k][i] : 0;
+      results->offset[i][k] = offset[i];
+    }
+  }
+}
+
+// The state of a contact that takes over from others: their spring, and no dissipation to be finished.
+void take_over(const ContactCoefficients& law, const ContactGeometry& g, const BodyMotion& a,
+               const BodyMotion& b, double dt, const Vec3& spring, ContactState* state) {
+  *state = ContactState{};
+  if (!(g.overlap > 0)) return;
+  state->active = 1;
+  store(g.normal, state->normal);
+  store(spring, state->spring);
+  if (!set_contact(law, g, a, b, *state)) return;
+  state->dt = dt;
+  state->damping_force = 0;
+  for (int k = 0; k < 3; ++k) state->tangential_force[k] = -law.kt * state->spring[k];
+}
+
+}  // namespace
+
+bool ContactStages::may_be_flat(int a, int b) const {
+  const auto has = [this](int i) {
+    const BodyArrays& arrays = step_.bodies->arrays();
+    return !arrays.shapes[arrays.shape[i]]->flats.empty();
+  };
+  return step_.settings.solver == Solver::ladder && has(b) && (a < 0 || has(a));
+}
+
+// Energy that left the springs.
+void ContactStages::book(double energy, int a, int b) {
+  if (step_.ledger) dissipated_.damping += share(a, b) * energy;
+}
+
+static PolygonState now(const ContactPolygon& polygon, const Bodies& bodies, const BodyRecord* wall, int a,
+                        int b) {
+  const BodyArrays& arrays = bodies.arrays();
+  return evaluate(polygon, a < 0 ? plane_frame(load(wall->x)) : frame_of(bodies.record(a), arrays.scale[a]),
+                  frame_of(bodies.record(b), arrays.scale[b]));
+}
+
+// Tries to turn a touching contact into several. The springs keep their energy across the normal; what they
+// gain or lose along it is booked.
+bool ContactStages::make_flat(ContactBlock& block, int lane, const Results& single) {
+  const int a = block.a[lane], b = block.b[lane];
+  const double overlap = -single.gap[lane];
+  ContactPolygon polygon;
+  const Particle body = step_.bodies->particle(b);
+  const bool made = a < 0 ? make_plane_polygon(body, load(step_.wall->x), step_.wall_normal, overlap,
+                                               kReach * overlap, &polygon)
+                          : make_pair_polygon(step_.bodies->particle(a), body, single.normal_of(lane),
+                                              overlap, kReach * overlap, nullptr, &polygon);
+  if (!made || polygon.count < 2) return false;
+  const PolygonState state = now(polygon, *step_.bodies, step_.wall, a, b);
+  const double weight = block.field[kWeight][lane];
+  polygon.factor = continuity_factor(0.5 * weight * overlap * overlap, polygon, state);
+
+  ContactState old;
+  block.get(lane, kStateField, kContactStateSize, &old);
+  FlatContact& flat = pool_.add_flat(block.proof[lane]->contact);
+  flat.polygon = polygon;
+  flat.points.used = (1u << polygon.count) - 1;
+  bind(block.neighbour[lane]);
+  set_law(block.neighbour[lane]);
+  if (old.active != 0) {
+    const ContactCoefficients& all = step_.laws[block.law[lane]];
+    const BodyMotion motion_a = motion_of(record(a)), motion_b = motion_of(record(b));
+    EnergyLedger work;
+    finish_contact(scaled(all, weight), motion_a, motion_b, step_.dt, old, work);
+    if (step_.ledger) dissipated_.add(work, share(a, b));
+    double energy = stored_energy(scaled(all, weight), old).tangential_spring;
+    for (int k = 0; k < polygon.count; ++k) {
+      const ContactCoefficients own = scaled(all, polygon.factor * polygon.weight[k]);
+      ContactState point;
+      take_over(own, {-state.gap[k], state.normal, state.arm_a[k], state.arm_b[k]}, motion_a, motion_b,
+                step_.dt, load(old.spring), &point);
+      flat.points.set(k, kStateField, kContactStateSize, &point);
+      energy -= stored_energy(own, point).tangential_spring;
+    }
+    book(energy, a, b);
+  }
+  const ContactState none{};
+  block.set(lane, kStateField, kContactStateSize, &none);
+  block.field[kWeight][lane] = 1;
+  run_flat(block, lane, flat, state);
+  return true;
+}
+
+// One step of a pair that has a polygon; false when it has left it, and the single contact serves again.
+bool ContactStages::serve_flat(ContactBlock& block, int lane) {
+  const int a = block.a[lane], b = block.b[lane];
+  FlatContact& flat = *pool_.flat_of(block, lane);
+  PolygonState state = now(flat.polygon, *step_.bodies, step_.wall, a, b);
+  const PolygonVerdict verdict = judge(flat.polygon, state);
+  if (!step_.setup && verdict != PolygonVerdict::keep) {
+    const Particle body = step_.bodies->particle(b);
+    const Particle first = a < 0 ? Particle{} : step_.bodies->particle(a);
+    bool stays = verdict != PolygonVerdict::open;
+    if (stays) {
+      const double deepest = support_gap(flat.polygon, a < 0 ? nullptr : &first, body,
+                                         a < 0 ? load(step_.wall->x) : Vec3(Vec3::Zero()));
+      if (verdict == PolygonVerdict::moved || outgrown(state, deepest))
+        stays = remake(block, lane, flat, state, std::max(-deepest, -state.least));
+    }
+    if (!stays) {
+      leave_flat(block, lane, flat, state);
+      return false;
+    }
+  }
+  const double work = step_.setup || flat.polygon.factor <= 1 ? 0 : relax(flat.polygon, state, kRelaxation);
+  book(-step_.laws[block.law[lane]].kn * work, a, b);
+  counts_.value[ContactCounts::local_model] += share(a, b);
+  run_flat(block, lane, flat, state);
+  return true;
+}
+
+// The polygon anew, after the points slid or the body tilted; histories go to the new points.
+bool ContactStages::remake(ContactBlock& block, int lane, FlatContact& flat, PolygonState& state,
+                           double overlap) {
+  const int a = block.a[lane], b = block.b[lane];
+  const Particle body = step_.bodies->particle(b);
+  ContactPolygon polygon;
+  const double reach = kReach * overlap;
+  const bool made =
+      a < 0 ? make_plane_polygon(body, load(step_.wall->x), step_.wall_normal, overlap, reach, &polygon)
+            : make_pair_polygon(step_.bodies->particle(a), body, state.normal, overlap, reach, &flat.polygon,
+                                &polygon);
+  if (!made || polygon.count < 2) return false;
+  polygon.factor = flat.polygon.factor;
+  const PolygonState fresh = now(polygon, *step_.bodies, step_.wall, a, b);
+  int source[kContactPoints];
+  match(flat.polygon, state, polygon, fresh, source);
+
+  const ContactCoefficients& all = step_.laws[block.law[lane]];
+  const BodyMotion motion_a = motion_of(record(a)), motion_b = motion_of(record(b));
+  double energy = all.kn * (stored_energy(flat.polygon, state) - stored_energy(polygon, fresh));
+  ContactState old[kBlock];
+  for (int k = 0; k < kBlock; ++k) {
+    flat.points.get(k, kStateField, kContactStateSize, &old[k]);
+    if (k >= state.count || old[k].active == 0) continue;
+    const ContactCoefficients own = coefficients(flat.points, k);
+    EnergyLedger work;
+    finish_contact(own, motion_a, motion_b, step_.dt, old[k], work);
+    if (step_.ledger) dissipated_.add(work, share(a, b));
+    energy += stored_energy(own, old[k]).tangential_spring;
+  }
+  for (int k = 0; k < kBlock; ++k) {
+    ContactState point{};
+    if (k < polygon.count && old[source[k]].active != 0) {
+      const ContactCoefficients own = scaled(all, polygon.factor * polygon.weight[k]);
+      take_over(own, {-fresh.gap[k], fresh.normal, fresh.arm_a[k], fresh.arm_b[k]}, motion_a, motion_b,
+                step_.dt, load(old[source[k]].spring), &point);
+      energy -= stored_energy(own, point).tangential_spring;
+    }
+    flat.points.set(k, kStateField, kContactStateSize, &point);
+  }
+  book(energy, a, b);
+  flat.polygon = polygon;
+  flat.points.used = (1u << polygon.count) - 1;
+  state = fresh;
+  return true;
+}
+
+// Law and sums of the points.
+void ContactStages::run_flat(ContactBlock& block, int lane, FlatContact& flat, const PolygonState& state) {
+  const int a = block.a[lane], b = block.b[lane];
+  Results results;
+  fill(flat.polygon, state, offset(a, b), &flat.points, &results);
+  for (int k = 0; k < state.count; ++k) {
+    if (step_.setup)
+      start_run(flat.points, k, results);
+    else if (results.touching[k] == 0)
+      close(flat.points, k);
+    counts_.value[ContactCounts::contacts] += share(a, b) * results.touching[k];
+  }
+  if (!step_.setup) apply_law(flat.points, results);
+}
+
+// Back to one contact: it gets the springs' mean, weighted, and a weight that keeps the energy; what the
+// springs across the normal had besides is lost to friction.
+void ContactStages::leave_flat(ContactBlock& block, int lane, FlatContact& flat, const PolygonState& state) {
+  const int a = block.a[lane], b = block.b[lane];
+  const double overlap = -state.least;
+  ContactState single{};
+  double weight = 1;
+  if (overlap > 0) {
+    const ContactCoefficients& all = step_.laws[block.law[lane]];
+    const BodyMotion motion_a = motion_of(record(a)), motion_b = motion_of(record(b));
+    weight = 2 * stored_energy(flat.polygon, state) / (overlap * overlap);
+    Vec3 spring = Vec3::Zero(), arm_a = Vec3::Zero(), arm_b = Vec3::Zero();
+    double sum = 0, energy = 0;
+    for (int k = 0; k < state.count; ++k) {
+      ContactState point;
+      flat.points.get(k, kStateField, kContactStateSize, &point);
+      const ContactCoefficients own = coefficients(flat.points, k);
+      if (point.active != 0) {
+        EnergyLedger work;
+        finish_contact(own, motion_a, motion_b, step_.dt, point, work);
+        if (step_.ledger) dissipated_.add(work, share(a, b));
+        energy += stored_energy(own, point).tangential_spring;
+      }
+      const double load_of = std::max(0.0, -state.gap[k]) * flat.polygon.weight[k];
+      sum += load_of;
+      spring += load_of * load(point.spring);
+      arm_a += load_of * state.arm_a[k];
+      arm_b += load_of * state.arm_b[k];
+    }
+    const ContactCoefficients own = scaled(all, weight);
+    take_over(own, {overlap, state.normal, arm_a / sum, arm_b / sum}, motion_a, motion_b, step_.dt,
+              spring / sum, &single);
+    book(energy - stored_energy(own, single).tangential_spring, a, b);
+  } else {
+    for (int k = 0; k < state.count; ++k) close(flat.points, k);
+  }
+  pool_.drop_flat(block.proof[lane]->contact);
+  block.set(lane, kStateField, kContactStateSize, &single);
+  block.field[kWeight][lane] = weight;
+}
+
+// A contact that was left with more or less than its stiffness gets back to it while it can give energy up.
+void ContactStages::relax_weight(ContactBlock& block, int lane, double gap) {
+  double& weight = block.field[kWeight][lane];
+  if (weight == 1) return;
+  if (block.field[kStateField][lane] == 0) {
+    weight = 1;
+    return;
+  }
+  if (weight < 1) return;
+  const double change = kRelaxation * (1 - weight);
+  book(-0.5 * step_.laws[block.law[lane]].kn * change * gap * gap, block.a[lane], block.b[lane]);
+  weight += change;
+}
+
+}  // namespace nurbs

@@ -1,0 +1,498 @@
+// Contact polygons: closed forms, dense sampling, finite differences, hand-overs.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+#include <vector>
+
+#include "bodies.h"
+#include "body/flat_faces.h"
+#include "contact/contact_polygon.h"
+#include "contact/pair_search.h"
+#include "flat_bodies.h"
+
+namespace {
+
+using namespace nurbs;
+using namespace nurbs::test;
+
+ShapePointer roller() {
+  static const ShapePointer s = make_shape("cylinder", cylinder(0.7, 1.5));
+  return s;
+}
+ShapePointer pill() {
+  static const ShapePointer s = make_shape("tablet", tablet(1, 0.3, 0.2));
+  return s;
+}
+ShapePointer soap() {
+  static const ShapePointer s = make_shape("rounded box", rounded_box(Vec3(1, 0.8, 0.6), 0.2));
+  return s;
+}
+ShapePointer slab() {
+  static const ShapePointer s = make_shape("slab", box(Vec3(3, 2.5, 0.2)));
+  return s;
+}
+
+// A scene turned and moved at random: bodies are placed in it as if it were the lab.
+struct Scene {
+  Quat q;
+  Vec3 x;
+  explicit Scene(Random& random) : q(random.turn()), x(3 * random.direction()) {}
+  Particle place(const Shape& shape, const Vec3& at, const Quat& turn, double scale = 1) const {
+    Particle p;
+    p.shape = &shape;
+    p.scale = scale;
+    p.x = x + q * at;
+    p.q = (q * turn).normalized();
+    return p;
+  }
+};
+
+Quat about(const Vec3& axis, double angle) {
+  return Quat(Eigen::AngleAxisd(angle, axis.normalized()));
+}
+
+Vec3 pressure_centre(const ContactPolygon& polygon, const PolygonState& state) {
+  Vec3 sum = Vec3::Zero();
+  for (int i = 0; i < state.count; ++i) sum += polygon.weight[i] * state.arm_a[i];
+  return sum;
+}
+
+double total_weight(const ContactPolygon& polygon) {
+  double sum = 0;
+  for (int i = 0; i < polygon.count; ++i) {
+    EXPECT_GT(polygon.weight[i], 0);
+    sum += polygon.weight[i];
+  }
+  return sum;
+}
+
+// --- plane
+
+struct OnPlane {
+  ShapePointer shape;
+  Quat turn;
+  double height;  // of the centre when it touches
+  int points;     // 0: a single point
+  bool rolling;
+};
+
+TEST(PlanePolygon, faces_lines_and_points) {
+  Random random(1);
+  const double half = std::sqrt(0.5);
+  const std::vector<OnPlane> cases = {
+      {cuboid(), Quat::Identity(), 0.6, 4, false},
+      {cuboid(), about(Vec3::UnitX(), M_PI / 2), 0.8, 4, false},
+      {cuboid(), about(Vec3::UnitX(), M_PI / 4), half * 1.4, 2, false},
+      {roller(), Quat::Identity(), 1.5, 8, false},
+      {roller(), about(Vec3(0.3, 0.4, 0), M_PI / 2), 0.7, 2, true},
+      {pill(), about(Vec3::UnitY(), M_PI / 2), 1, 2, true},
+      {pill(), Quat::Identity(), 0.5, 0, false},
+      {soap(), Quat::Identity(), 0.6, 4, false},
+      {soap(), about(Vec3::UnitX(), M_PI / 4), half * 1.0 + 0.2, 2, true},
+      {sphere(), Quat::Identity(), 1, 0, false},
+  };
+  for (const OnPlane& c : cases) {
+    const Scene scene(random);
+    const double scale = random.uniform(0.5, 2), overlap = 1e-3;
+    const Vec3 spin = Vec3::UnitZ();
+    const Particle p = scene.place(*c.shape, Vec3(0.4, -0.7, scale * c.height - overlap),
+                                   about(spin, random.uniform(0, 6)) * c.turn, scale);
+    const Vec3 normal = scene.q * Vec3::UnitZ();
+    ContactPolygon polygon;
+    EXPECT_EQ(make_plane_polygon(p, scene.x, normal, overlap, kReach * overlap, &polygon), c.points > 0);
+    ASSERT_EQ(polygon.count, c.points) << c.shape->name;
+    EXPECT_EQ(polygon.rolling, c.rolling ? 1 : 0);
+    if (c.points == 0) continue;
+    EXPECT_NEAR(total_weight(polygon), 1, 1e-14);
+    const PolygonState state = evaluate(polygon, plane_frame(scene.x), body_frame(p));
+    EXPECT_LT((state.normal - normal).norm(), 1e-15);
+    for (int i = 0; i < state.count; ++i) {
+      EXPECT_NEAR(state.gap[i], -overlap, 1e-12);
+      EXPECT_NEAR(state.arm_a[i].dot(normal), -0.5 * overlap, 1e-12);
+      EXPECT_LT((scene.x + state.arm_a[i] - p.x - state.arm_b[i]).norm(), 1e-14);
+    }
+    const Vec3 foot = p.x - scene.x - normal * normal.dot(p.x - scene.x);
+    const bool askew = std::abs(c.turn.w() - std::cos(M_PI / 8)) < 1e-9;  // on an edge not below the centre
+    const Vec3 off = pressure_centre(polygon, state) + 0.5 * overlap * normal - foot;
+    EXPECT_NEAR(off.norm(), askew ? 0.2 * half * scale : 0, 1e-9);
+    EXPECT_NEAR(support_gap(polygon, nullptr, p, scene.x), -overlap, 1e-12);
+    EXPECT_NEAR(stored_energy(polygon, state), 0.5 * overlap * overlap, 1e-14);
+    EXPECT_EQ(judge(polygon, state), c.rolling       ? PolygonVerdict::moved
+                                     : c.points == 2 ? PolygonVerdict::tilted
+                                                     : PolygonVerdict::keep);
+  }
+}
+
+TEST(PlanePolygon, a_tilt_beyond_reach_leaves_one_edge_then_one_corner) {
+  const double overlap = 1e-3;
+  const auto count = [&](const Quat& turn) {
+    Particle p;
+    p.shape = cuboid().get();
+    p.q = turn;
+    p.x[2] = find_support(*p.shape, turn.conjugate() * -Vec3::UnitZ()).h - overlap;
+    ContactPolygon polygon;
+    make_plane_polygon(p, Vec3::Zero(), Vec3::UnitZ(), overlap, kReach * overlap, &polygon);
+    return polygon.count;
+  };
+  EXPECT_EQ(count(about(Vec3::UnitY(), 1.4e-3)), 4);  // 2.8e-3 over the length of 2
+  EXPECT_EQ(count(about(Vec3::UnitY(), 1.6e-3)), 2);
+  EXPECT_EQ(count(about(Vec3::UnitY(), 0.3)), 2);
+  EXPECT_EQ(count(about(Vec3::UnitX(), 3e-3) * about(Vec3::UnitY(), 0.3)), 0);
+}
+
+TEST(PlanePolygon, a_tilted_disc_keeps_its_lowest_point) {
+  Random random(2);
+  for (int trial = 0; trial < 50; ++trial) {
+    const double overlap = 1e-3, tilt = random.uniform(2e-4, 1.5e-3), heading = random.uniform(0, 2 * M_PI);
+    Particle p;
+    p.shape = roller().get();
+    p.q = about(Vec3(std::cos(heading), std::sin(heading), 0), tilt);
+    p.x[2] = find_support(*p.shape, p.q.conjugate() * -Vec3::UnitZ()).h - overlap;
+    ContactPolygon polygon;
+    ASSERT_TRUE(make_plane_polygon(p, Vec3::Zero(), Vec3::UnitZ(), overlap, kReach * overlap, &polygon));
+    EXPECT_EQ(polygon.count, 8);
+    const PolygonState state = evaluate(polygon, plane_frame(Vec3::Zero()), body_frame(p));
+    EXPECT_NEAR(state.least, -overlap, 1e-10);
+    const Vec3 centre = p.q * Vec3(0, 0, -1.5) + p.x;
+    Vec3 off = pressure_centre(polygon, state) - centre;
+    off[2] = 0;
+    EXPECT_LT(off.norm(), 2e-3);
+    EXPECT_FALSE(outgrown(state, support_gap(polygon, nullptr, p)));
+  }
+}
+
+// --- pair
+
+struct Region {
+  double area = 0;
+  Vec3 centre = Vec3::Zero();  // scene
+};
+
+// The region of the plane z = 0 under the first face and over the second, by sampling their support
+// functions' own definition: a point is under a face when it is inside all side planes of the sampled
+// outline.
+template <class InA, class InB>
+Region sample(const InA& in_a, const InB& in_b, double extent) {
+  constexpr int kGrid = 800;
+  const double cell = 2 * extent / kGrid;
+  Region region;
+  for (int i = 0; i < kGrid; ++i)
+    for (int j = 0; j < kGrid; ++j) {
+      const Vec3 x(-extent + cell * (i + 0.5), -extent + cell * (j + 0.5), 0);
+      if (!in_a(x) || !in_b(x)) continue;
+      region.area += cell * cell;
+      region.centre += cell * cell * x;
+    }
+  region.centre /= region.area;
+  return region;
+}
+
+TEST(PairPolygon, boxes_face_to_face_against_dense_sampling) {
+  Random random(3);
+  for (int trial = 0; trial < 40; ++trial) {
+    const Scene scene(random);
+    const double overlap = 1e-4, angle = random.uniform(0, 2 * M_PI), scale = random.uniform(0.5, 1.5);
+    const Vec3 shift(random.uniform(-1, 1), random.uniform(-0.8, 0.8), 0.6 + 0.6 * scale - overlap);
+    const Particle a = scene.place(*cuboid(), Vec3::Zero(), Quat::Identity());
+    const Particle b = scene.place(*cuboid(), shift, about(Vec3::UnitZ(), angle), scale);
+    const Vec3 normal = scene.q * Vec3::UnitZ();
+    ContactPolygon polygon, reversed;
+    ASSERT_TRUE(make_pair_polygon(a, b, normal, overlap, kReach * overlap, nullptr, &polygon));
+    const PolygonState state = evaluate(polygon, body_frame(a), body_frame(b));
+    EXPECT_LT((state.normal - normal).norm(), 1e-14);
+    EXPECT_NEAR(total_weight(polygon), 1, 1e-13);
+    for (int i = 0; i < state.count; ++i) {
+      EXPECT_NEAR(state.gap[i], -overlap, 1e-13);
+      EXPECT_LT((state.arm_b[i] - (state.arm_a[i] + a.x - b.x)).norm(), 1e-13);
+    }
+    const Region region = sample([](const Vec3& x) { return std::abs(x[0]) <= 1 && std::abs(x[1]) <= 0.8; },
+                                 [&](const Vec3& x) {
+                                   const Vec3 y =
+                                       about(Vec3::UnitZ(), -angle) * (x - Vec3(shift[0], shift[1], 0));
+                                   return std::abs(y[0]) <= scale && std::abs(y[1]) <= 0.8 * scale;
+                                 },
+                                 1.1);
+    Vec3 centre = scene.q.conjugate() * pressure_centre(polygon, state);
+    centre[2] = 0;
+    EXPECT_LT((centre - region.centre).norm(), 5e-3) << trial;
+
+    // The other way round: the same points under the same names but for the roles of A and B.
+    ASSERT_TRUE(make_pair_polygon(b, a, -normal, overlap, kReach * overlap, nullptr, &reversed));
+    ASSERT_EQ(reversed.count, polygon.count);
+    const PolygonState back = evaluate(reversed, body_frame(b), body_frame(a));
+    for (int i = 0; i < state.count; ++i) {
+      double least = 1, weight = 0;
+      for (int j = 0; j < back.count; ++j) {
+        const double d = (back.arm_b[j] - state.arm_a[i]).norm();
+        if (d < least) least = d, weight = reversed.weight[j];
+      }
+      EXPECT_LT(least, 1e-12);
+      EXPECT_NEAR(weight, polygon.weight[i], 1e-12);
+    }
+  }
+}
+
+TEST(PairPolygon, disc_over_the_border_of_a_box) {
+  Random random(4);
+  const auto disc = make_shape("short cylinder", cylinder(0.7, 0.4));
+  for (int trial = 0; trial < 20; ++trial) {
+    const Scene scene(random);
+    const double overlap = 1e-4;
+    const Vec3 shift(random.uniform(-1.4, 1.4), random.uniform(-1.2, 1.2), 1.0 - overlap);
+    if (std::abs(shift[0]) > 1.2 && std::abs(shift[1]) > 1) continue;
+    const Particle a = scene.place(*cuboid(), Vec3::Zero(), Quat::Identity());
+    const Particle b = scene.place(*disc, shift, about(Vec3::UnitZ(), random.uniform(0, 6)));
+    ContactPolygon polygon;
+    ASSERT_TRUE(
+        make_pair_polygon(a, b, scene.q * Vec3::UnitZ(), overlap, kReach * overlap, nullptr, &polygon));
+    EXPECT_LE(polygon.count, 8);
+    const PolygonState state = evaluate(polygon, body_frame(a), body_frame(b));
+    const Region region =
+        sample([](const Vec3& x) { return std::abs(x[0]) <= 1 && std::abs(x[1]) <= 0.8; },
+               [&](const Vec3& x) { return std::hypot(x[0] - shift[0], x[1] - shift[1]) <= 0.7; }, 1.1);
+    Vec3 centre = scene.q.conjugate() * pressure_centre(polygon, state);
+    centre[2] = 0;
+    EXPECT_LT((centre - region.centre).norm(), 1e-2);
+  }
+}
+
+TEST(PairPolygon, edges_lines_and_single_points) {
+  Random random(5);
+  const double overlap = 1e-4, half = std::sqrt(0.5);
+  struct Case {
+    ShapePointer a, b;
+    Vec3 at;
+    Quat turn;
+    int points;
+    bool rolling;
+    double length;  // of the segment
+  };
+  const std::vector<Case> cases = {
+      // a box on its edge, whole on the slab
+      {slab(), cuboid(), Vec3(0.1, 0.2, 0.2 + 1.4 * half), about(Vec3::UnitX(), M_PI / 4), 2, false, 2},
+      // half of it beyond the border
+      {slab(), cuboid(), Vec3(3, 0.2, 0.2 + 1.4 * half), about(Vec3::UnitX(), M_PI / 4), 2, false, 1},
+      // a corner
+      {slab(), cuboid(), Vec3(0.1, 0.2, 0.2 + std::sqrt(2.0)), Quat::Identity(), 0, false, 0},
+      // a cylinder on its side
+      {slab(), roller(), Vec3(0.1, 0.2, 0.9), about(Vec3::UnitX(), M_PI / 2), 2, true, 3},
+      {slab(), roller(), Vec3(0.1, 2, 0.9), about(Vec3::UnitX(), M_PI / 2), 2, true, 2},
+      // two cylinders, parallel and crossed
+      {roller(), roller(), Vec3(1.4, 0, 0.5), Quat::Identity(), 2, true, 2.5},
+      {roller(), roller(), Vec3(1.4, 0, 0.5), about(Vec3::UnitX(), 0.5), 0, false, 0},
+      // a sphere on a box
+      {slab(), sphere(), Vec3(0.1, 0.2, 1.2), Quat::Identity(), 0, false, 0},
+      // a rounded box on its face
+      {slab(), soap(), Vec3(0.1, 0.2, 0.8), Quat::Identity(), 4, false, 0},
+  };
+  for (size_t k = 0; k < cases.size(); ++k) {
+    const Case& c = cases[k];
+    const Scene scene(random);
+    const Vec3 d = k == 5 || k == 6 ? Vec3::UnitX() : Vec3::UnitZ();
+    const Quat turn = k == 2 ? Quat::FromTwoVectors(Vec3(1, 0.8, 0.6), -Vec3::UnitZ()) : c.turn;
+    for (const bool swap : {false, true}) {
+      const Particle a = scene.place(*c.a, Vec3::Zero(), Quat::Identity());
+      const Particle b = scene.place(*c.b, c.at - overlap * d, turn);
+      ContactPolygon polygon;
+      const Vec3 normal = (swap ? -1 : 1) * (scene.q * d);
+      make_pair_polygon(swap ? b : a, swap ? a : b, normal, overlap, kReach * overlap, nullptr, &polygon);
+      ASSERT_EQ(polygon.count, c.points) << k << swap;
+      EXPECT_EQ(polygon.rolling, c.rolling ? 1 : 0) << k;
+      if (c.points == 0) continue;
+      const PolygonState state = evaluate(polygon, body_frame(swap ? b : a), body_frame(swap ? a : b));
+      EXPECT_LT((state.normal - normal).norm(), 1e-12);
+      for (int i = 0; i < state.count; ++i) EXPECT_NEAR(state.gap[i], -overlap, 1e-11) << k;
+      const double length = (state.arm_a[0] - state.arm_a[1]).norm();
+      EXPECT_TRUE(c.points != 2 || std::abs(length - c.length) < 1e-9) << k;
+    }
+  }
+}
+
+// A face inside another one's outline is incident, whoever is A: it may slide without a remake.
+TEST(PairPolygon, a_small_face_owns_the_points) {
+  const double overlap = 1e-4;
+  Particle a, b;
+  a.shape = slab().get();
+  b.shape = cuboid().get();
+  b.x = Vec3(0.5, -0.3, 0.8 - overlap);
+  ContactPolygon polygon;
+  ASSERT_TRUE(make_pair_polygon(a, b, Vec3::UnitZ(), overlap, kReach * overlap, nullptr, &polygon));
+  EXPECT_EQ(polygon.reference, 0);
+  EXPECT_NEAR(polygon.room, 1.4, 1e-12);
+  ContactPolygon other;
+  ASSERT_TRUE(make_pair_polygon(b, a, -Vec3::UnitZ(), overlap, kReach * overlap, nullptr, &other));
+  EXPECT_EQ(other.reference, 1);
+  EXPECT_NEAR(other.room, 1.4, 1e-12);
+  b.x[0] += 0.3;
+  PolygonState state = evaluate(polygon, body_frame(a), body_frame(b));
+  EXPECT_NEAR(state.slid, 0.9, 1e-12);  // a bound: 0.3 at both marks
+  EXPECT_EQ(judge(polygon, state), PolygonVerdict::keep);
+  b.x[0] += 0.3;
+  state = evaluate(polygon, body_frame(a), body_frame(b));
+  EXPECT_EQ(judge(polygon, state), PolygonVerdict::moved);
+  b.x[2] += 2 * overlap;
+  state = evaluate(polygon, body_frame(a), body_frame(b));
+  EXPECT_EQ(judge(polygon, state), PolygonVerdict::open);
+}
+
+// --- energy
+
+// Moves along coordinate k: three translations, three turns about the centre, lab axes.
+Particle moved(Particle p, int k, double by) {
+  if (k < 3)
+    p.x[k] += by;
+  else
+    p.q = Quat(Eigen::AngleAxisd(by, Vec3::Unit(k - 3))) * p.q;
+  return p;
+}
+
+TEST(PairPolygon, forces_are_the_gradient_of_the_energy) {
+  Random random(6);
+  for (int trial = 0; trial < 30; ++trial) {
+    const Scene scene(random);
+    const double overlap = 0.03, h = 1e-6;
+    const Particle a = scene.place(*cuboid(), Vec3::Zero(), random.turn_by(0.02));
+    const Particle b = scene.place(*cuboid(), Vec3(0.3, 0.4, 1.02 - overlap),
+                                   about(Vec3::UnitZ(), random.uniform(0, 6)) * random.turn_by(0.02), 0.7);
+    ContactPolygon polygon;
+    const bool from_a = trial % 2 == 0;
+    const Particle &first = from_a ? a : b, &second = from_a ? b : a;
+    ASSERT_TRUE(make_pair_polygon(first, second, (from_a ? 1 : -1) * (scene.q * Vec3::UnitZ()), overlap, 0.3,
+                                  nullptr, &polygon));
+    ASSERT_GE(polygon.count, 3);
+    polygon.factor = random.uniform(0.5, 2);
+    const auto energy = [&](const Particle& p, const Particle& q) {
+      return stored_energy(polygon, evaluate(polygon, body_frame(p), body_frame(q)));
+    };
+    const PolygonState state = evaluate(polygon, body_frame(first), body_frame(second));
+    Eigen::Matrix<double, 6, 1> on_first = Eigen::Matrix<double, 6, 1>::Zero(), on_second = on_first;
+    for (int i = 0; i < state.count; ++i) {
+      const Vec3 f = polygon.factor * polygon.weight[i] * std::max(0.0, -state.gap[i]) * state.normal;
+      on_first.head<3>() -= f;
+      on_first.tail<3>() -= state.arm_a[i].cross(f);
+      on_second.head<3>() += f;
+      on_second.tail<3>() += state.arm_b[i].cross(f);
+    }
+    const double size = on_first.norm();
+    ASSERT_GT(size, 1e-3);
+    for (int k = 0; k < 6; ++k) {
+      const double first_slope =
+          (energy(moved(first, k, h), second) - energy(moved(first, k, -h), second)) / (2 * h);
+      const double second_slope =
+          (energy(first, moved(second, k, h)) - energy(first, moved(second, k, -h))) / (2 * h);
+      EXPECT_NEAR(on_first[k], -first_slope, 1e-7 * size) << k;
+      EXPECT_NEAR(on_second[k], -second_slope, 1e-7 * size) << k;
+    }
+  }
+}
+
+// A ruled line is remade every step: its energy is then a function of the pose, and the same forces its
+// gradient.
+TEST(PlanePolygon, a_rolling_line_has_a_potential) {
+  const double overlap = 1e-2, h = 1e-6;
+  Particle p;
+  p.shape = roller().get();
+  p.q = about(Vec3::UnitY(), 2e-3) * about(Vec3::UnitX(), M_PI / 2 - 1e-3) * about(Vec3::UnitZ(), 0.3);
+  p.x[2] = find_support(*p.shape, p.q.conjugate() * -Vec3::UnitZ()).h - overlap;
+  const auto polygon_at = [&](const Particle& at) {
+    ContactPolygon polygon;
+    EXPECT_TRUE(make_plane_polygon(at, Vec3::Zero(), Vec3::UnitZ(), overlap, 2 * overlap, &polygon));
+    return polygon;
+  };
+  const auto energy = [&](const Particle& at) {
+    const ContactPolygon polygon = polygon_at(at);
+    return stored_energy(polygon, evaluate(polygon, plane_frame(Vec3::Zero()), body_frame(at)));
+  };
+  const ContactPolygon polygon = polygon_at(p);
+  const PolygonState state = evaluate(polygon, plane_frame(Vec3::Zero()), body_frame(p));
+  Eigen::Matrix<double, 6, 1> force = Eigen::Matrix<double, 6, 1>::Zero();
+  for (int i = 0; i < state.count; ++i) {
+    const Vec3 f = -polygon.weight[i] * state.gap[i] * state.normal;
+    force.head<3>() += f;
+    force.tail<3>() += state.arm_b[i].cross(f);
+  }
+  for (int k = 0; k < 6; ++k) {
+    const double slope = (energy(moved(p, k, h)) - energy(moved(p, k, -h))) / (2 * h);
+    EXPECT_NEAR(force[k], -slope, 1e-7 * force.norm()) << k;
+  }
+}
+
+TEST(ContactPolygon, hand_over_keeps_the_energy_and_relaxing_books_it) {
+  Particle p;
+  p.shape = cuboid().get();
+  const double overlap = 1e-3;
+  p.q = about(Vec3(1, 1, 0), 1e-3);
+  p.x[2] = find_support(*p.shape, p.q.conjugate() * -Vec3::UnitZ()).h - overlap;
+  ContactPolygon polygon;
+  ASSERT_TRUE(make_plane_polygon(p, Vec3::Zero(), Vec3::UnitZ(), overlap, kReach * overlap, &polygon));
+  const PolygonState state = evaluate(polygon, plane_frame(Vec3::Zero()), body_frame(p));
+  const double single = 0.5 * overlap * overlap;
+  polygon.factor = continuity_factor(single, polygon, state);
+  EXPECT_GT(polygon.factor, 1);
+  EXPECT_LE(polygon.factor, 4);
+  EXPECT_NEAR(stored_energy(polygon, state), single, 1e-15 * single);
+  const double work = relax(polygon, state, 1);
+  EXPECT_EQ(polygon.factor, 1);
+  EXPECT_LT(work, 0);
+  EXPECT_NEAR(stored_energy(polygon, state), single + work, 1e-15 * single);
+  EXPECT_EQ(continuity_factor(0, polygon, state), 1);
+}
+
+// --- sliding
+
+TEST(PairPolygon, sliding_over_a_border_is_continuous) {
+  const double overlap = 1e-4;
+  Particle a, b;
+  a.shape = b.shape = cuboid().get();
+  b.q = about(Vec3::UnitZ(), 0.4);
+  ContactPolygon polygon = {};
+  PolygonState state;
+  int remakes = 0, named = 0, points = 0;
+  Vec3 before = Vec3::Zero();
+  constexpr int kSteps = 4000;
+  for (int k = 0; k < kSteps; ++k) {
+    b.x = Vec3(-1.2 + 2.4 * k / kSteps, 0.3, 1.2 - overlap);
+    if (polygon.count > 0) {
+      state = evaluate(polygon, body_frame(a), body_frame(b));
+      EXPECT_NEAR(state.least, -overlap, 1e-13);
+      if (judge(polygon, state) != PolygonVerdict::moved) continue;
+    }
+    const ContactPolygon old = polygon;
+    ASSERT_TRUE(make_pair_polygon(a, b, Vec3::UnitZ(), overlap, kReach * overlap, &old, &polygon));
+    const PolygonState now = evaluate(polygon, body_frame(a), body_frame(b));
+    const Vec3 centre = pressure_centre(polygon, now);
+    if (old.count > 0) {
+      EXPECT_EQ(polygon.reference, old.reference);
+      EXPECT_LT((centre - before).norm(), 5e-3);
+      EXPECT_NEAR(stored_energy(polygon, now), stored_energy(old, state), 1e-12 * overlap * overlap);
+      int source[kContactPoints];
+      match(old, state, polygon, now, source);
+      for (int i = 0; i < polygon.count; ++i) {
+        ASSERT_GE(source[i], 0);
+        EXPECT_LT((now.arm_a[i] - state.arm_a[source[i]]).norm(), 0.2);
+        named += old.id[source[i]] == polygon.id[i];
+        ++points;
+      }
+      ++remakes;
+    }
+    before = centre;
+  }
+  EXPECT_GT(remakes, 100);
+  EXPECT_GT(named, 0.95 * points);  // names change only where a corner passes a side
+}
+
+TEST(ContactPolygon, is_plain_data) {
+  Particle p;
+  p.shape = cuboid().get();
+  p.x[2] = 0.6 - 1e-4;
+  ContactPolygon polygon, copy;
+  ASSERT_TRUE(make_plane_polygon(p, Vec3::Zero(), Vec3::UnitZ(), 1e-4, 3e-4, &polygon));
+  std::memcpy(&copy, &polygon, sizeof copy);
+  const PolygonState x = evaluate(polygon, plane_frame(Vec3::Zero()), body_frame(p));
+  const PolygonState y = evaluate(copy, plane_frame(Vec3::Zero()), body_frame(p));
+  for (int i = 0; i < x.count; ++i) EXPECT_EQ(x.gap[i], y.gap[i]);
+}
+
+}  // namespace
