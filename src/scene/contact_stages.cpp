@@ -403,7 +403,8 @@ void ContactStages::compute_block(ContactBlock& block) {
       solve_lane(block, lane, results);
     }
     if (step_.setup) {
-      start_run(block, lane, results);
+      const bool first = results.touching[lane] != 0 && block.field[kStateField][lane] == 0;
+      if (!(first && may_be_flat(a, b) && make_flat(block, lane, results))) start_run(block, lane, results);
       continue;
     }
     if (results.touching[lane] != 0) {

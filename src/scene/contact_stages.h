@@ -165,7 +165,9 @@ class ContactStages {
   bool serve_flat(ContactBlock& block, int lane);
   bool remake(ContactBlock& block, int lane, FlatContact& flat, PolygonState& state, double overlap);
   void run_flat(ContactBlock& block, int lane, FlatContact& flat, const PolygonState& state);
-  void leave_flat(ContactBlock& block, int lane, FlatContact& flat, const PolygonState& state);
+  void leave_flat(ContactBlock& block, int lane, FlatContact& flat, const PolygonState& state,
+                  double overlap);
+  void relax_factor(const ContactBlock& block, int lane, FlatContact& flat, const PolygonState& state);
   void relax_weight(ContactBlock& block, int lane, double gap);
   void book(double energy, int a, int b);
   void add_load(int body, const double* load);

@@ -128,22 +128,39 @@ bool ContactStages::serve_flat(ContactBlock& block, int lane) {
     const Particle body = step_.bodies->particle(b);
     const Particle first = a < 0 ? Particle{} : step_.bodies->particle(a);
     bool stays = verdict != PolygonVerdict::open;
+    double overlap = -state.least;
     if (stays) {
       const double deepest = support_gap(flat.polygon, a < 0 ? nullptr : &first, body,
                                          a < 0 ? load(step_.wall->x) : Vec3(Vec3::Zero()));
-      if (verdict == PolygonVerdict::moved || outgrown(state, deepest))
-        stays = remake(block, lane, flat, state, std::max(-deepest, -state.least));
+      if (verdict == PolygonVerdict::moved || outgrown(state, deepest)) {
+        overlap = std::max(overlap, -deepest);
+        stays = remake(block, lane, flat, state, overlap);
+      }
     }
     if (!stays) {
-      leave_flat(block, lane, flat, state);
+      leave_flat(block, lane, flat, state, overlap);
       return false;
     }
   }
-  const double work = step_.setup || flat.polygon.factor <= 1 ? 0 : relax(flat.polygon, state, kRelaxation);
-  book(-step_.laws[block.law[lane]].kn * work, a, b);
+  if (!step_.setup && flat.polygon.factor > 1) relax_factor(block, lane, flat, state);
   counts_.value[ContactCounts::local_model] += share(a, b);
   run_flat(block, lane, flat, state);
   return true;
+}
+
+// Towards the polygon's own stiffness; what the springs give up is booked.
+void ContactStages::relax_factor(const ContactBlock& block, int lane, FlatContact& flat,
+                                 const PolygonState& state) {
+  const ContactCoefficients& law = step_.laws[block.law[lane]];
+  const double before = flat.polygon.factor;
+  double energy = law.kn * relax(flat.polygon, state, kRelaxation);
+  for (int k = 0; k < state.count; ++k) {
+    ContactState point;
+    flat.points.get(k, kStateField, kContactStateSize, &point);
+    energy +=
+        (flat.polygon.factor - before) * flat.polygon.weight[k] * stored_energy(law, point).tangential_spring;
+  }
+  book(-energy, block.a[lane], block.b[lane]);
 }
 
 // The polygon anew, after the points slid or the body tilted; histories go to the new points.
@@ -208,11 +225,11 @@ void ContactStages::run_flat(ContactBlock& block, int lane, FlatContact& flat, c
   if (!step_.setup) apply_law(flat.points, results);
 }
 
-// Back to one contact: it gets the springs' mean, weighted, and a weight that keeps the energy; what the
-// springs across the normal had besides is lost to friction.
-void ContactStages::leave_flat(ContactBlock& block, int lane, FlatContact& flat, const PolygonState& state) {
+// Back to one contact, of the deepest point: it gets the springs' mean, weighted, and a weight that keeps the
+// energy; what the springs across the normal had besides is lost to friction.
+void ContactStages::leave_flat(ContactBlock& block, int lane, FlatContact& flat, const PolygonState& state,
+                               double overlap) {
   const int a = block.a[lane], b = block.b[lane];
-  const double overlap = -state.least;
   ContactState single{};
   double weight = 1;
   if (overlap > 0) {
@@ -259,7 +276,11 @@ void ContactStages::relax_weight(ContactBlock& block, int lane, double gap) {
   }
   if (weight < 1) return;
   const double change = kRelaxation * (1 - weight);
-  book(-0.5 * step_.laws[block.law[lane]].kn * change * gap * gap, block.a[lane], block.b[lane]);
+  ContactState state;
+  block.get(lane, kStateField, kContactStateSize, &state);
+  const ContactCoefficients& law = step_.laws[block.law[lane]];
+  book(-0.5 * change * (law.kn * gap * gap + law.kt * load(state.spring).squaredNorm()), block.a[lane],
+       block.b[lane]);
   weight += change;
 }
 

@@ -1,0 +1,162 @@
+#!/usr/bin/python3
+"""Flat faces: boxes and cylinders rest, stack, tip and slide as statics says, and the energy ledger closes."""
+import sys
+import unittest
+from pathlib import Path
+
+import numpy as np
+
+sys.path.insert(0, str(Path(__file__).resolve().parent))
+import deck  # noqa: E402
+
+G = 9.81
+DENSITY = 2500.0
+HALF = (0.5, 0.4, 0.3)  # half edges of the box
+MASS = DENSITY * 8 * np.prod(HALF)
+LAW = "kn 2e7 kt 1e7 cn 8e4 ct 4e4 mu 0.5"
+DECK = """
+units si
+newton off
+communicate single vel yes
+boundary f f f
+atom_style nurbs {shapes}
+read_data bodies.data
+{before}
+neighbor 0.05 bin
+neigh_modify delay 0
+pair_style gran/nurbs
+pair_coeff * * {law}
+fix floor all wall/nurbs plane 0 0 0 0 0 1 {law}
+fix weight all gravity 9.81 vector {gravity}
+fix motion all nve/nurbs
+compute ke all ke
+compute er all erotate/nurbs
+compute led all nurbs/energy
+compute at all nurbs/atom mass
+compute st all nurbs/stats
+variable mgh atom c_at*9.81*z
+compute mgh all reduce sum v_mgh
+variable kinetic equal c_ke+c_er
+variable ledger equal c_ke+c_er+c_mgh+c_led[1]+c_led[2]+c_led[3]+c_led[4]
+thermo_style custom step v_kinetic v_ledger c_led[3] c_led[4] c_st[8] c_st[10]
+thermo_modify norm no format float %.15g
+thermo {every}
+timestep {dt}
+dump d all custom {every} out.dump id x y z vx vy vz omegax omegay omegaz
+dump_modify d format "%d %.17g %.17g %.17g %.17g %.17g %.17g %.17g %.17g %.17g" sort id
+run {steps}
+"""
+
+
+def turned(axis, degrees):
+    half = np.radians(degrees) / 2
+    return (float(np.cos(half)), *(float(c) for c in np.sin(half) * np.array(axis, float) / np.linalg.norm(axis)))
+
+
+def run(atoms, steps, velocities=(), gravity="0 0 -1", law=LAW, dt=5e-5, every=None, ranks=1, shape=None, before=""):
+    files = {"box.json": shape or deck.shape_file("box", *HALF),
+             "bodies.data": deck.data_file(atoms, velocities, ((-3, 3), (-3, 3), (-1, 6)))}
+    return deck.run_ok(DECK.format(shapes="box.json", law=law, gravity=gravity, dt=dt, steps=steps, before=before,
+                                   every=every or max(1, steps // 20)), files=files, ranks=ranks)
+
+
+def atom(k, x, q=(1.0, 0.0, 0.0, 0.0), scale=1.0):
+    return (k, 1, 1, scale, DENSITY, *map(float, x), *map(float, q))
+
+
+def sunk(mass=MASS):
+    """Depth at which the floor carries a mass."""
+    return mass * G / 2e7
+
+
+class Rest(unittest.TestCase):
+    def test_a_dropped_box_lies_still(self):
+        for axis, angle in (((1, 0, 0), 0), ((1, 2, 0), 3), ((3, 1, 1), 25)):
+            r = run([atom(1, (0, 0, HALF[2] + 0.25), turned(axis, angle))], 80000)
+            fall = MASS * G * 0.25
+            left = r.thermo["kinetic"][-1] / fall
+            print(f"    dropped turned by {angle} degrees: kinetic energy {left:.1e} of the fall's,"
+                  f" contacts {r.thermo['st[8]'][-1]:.0f}", flush=True)
+            self.assertLess(left, 1e-12)
+            self.assertEqual(r.thermo["st[10]"].max(), 0)
+            self.assertAlmostEqual(r.dump("out.dump")[-1][1]["z"][0], HALF[2] - sunk(), delta=1e-6)
+
+    def test_the_ledger_closes(self):
+        residuals = []
+        for dt in (4e-5, 2e-5):
+            r = run([atom(1, (0, 0, HALF[2] + 0.25), turned((3, 1, 1), 25))], round(2 / dt), dt=dt)
+            lost = r.thermo["led[3]"][-1] + r.thermo["led[4]"][-1]
+            residuals.append(np.ptp(r.thermo["ledger"]) / lost)
+        print(f"    ledger: residuals {residuals} of what is dissipated", flush=True)
+        self.assertLess(residuals[-1], 1e-3)
+
+    def test_a_stack_of_five_lies_still(self):
+        height, atoms = 0.0, []
+        for k in range(5):
+            atoms.append(atom(k + 1, (0.01 * (k % 2), 0.008 * (k % 3), height + HALF[2] + 0.002 * (k + 1)),
+                              turned((0, 0, 1), 4 * k)))
+            height += 2 * HALF[2]
+        # The slowest motion is the stack's sway, 24 rad/s with these numbers, damped by 7 %.
+        kn = 2e8
+        r = run(atoms, 220000, law=f"kn {kn} kt 1e8 cn 1.2e6 ct 6e5 mu 0.5")
+        left = r.thermo["kinetic"][-1] / (MASS * G * 0.03)
+        print(f"    stack of five: kinetic energy {left:.1e} of the fall's, contacts {r.thermo['st[8]'][-1]:.0f}",
+              flush=True)
+        self.assertLess(left, 1e-12)
+        top = r.dump("out.dump")[-1][1]["z"][4]
+        self.assertAlmostEqual(top, 9 * HALF[2] - sum(MASS * n * G / kn for n in range(1, 6)), delta=1e-5)
+
+
+class Statics(unittest.TestCase):
+    def test_tips_at_the_angle_of_statics(self):
+        """Gravity leans about y, fast to a degree and a half before the brink, then by half a degree a second."""
+        edge = np.degrees(np.arctan(HALF[2] / HALF[0]))  # stands on the face whose half edges are 0.3 and 0.4
+        law = LAW.replace("mu 0.5", "mu 4")
+        dt, fast, slow = 5e-5, 40000, 120000
+        steps = fast + slow
+        leaning = f"""
+variable t equal step*dt
+variable first equal "({edge} - 1.5) * v_t / {fast * dt} * (v_t < {fast * dt})"
+variable second equal "({edge} - 1.5 + 0.5 * (v_t - {fast * dt})) * (v_t >= {fast * dt})"
+variable lean equal "(v_first + v_second) * PI / 180"
+variable gx equal sin(v_lean)
+variable gz equal -cos(v_lean)
+"""
+        r = run([atom(1, (0, 0, HALF[0] - sunk()), turned((0, 1, 0), 90))], steps, law=law, dt=dt, every=100,
+                gravity="v_gx 0 v_gz", before=leaning)
+        frames = r.dump("out.dump")
+        tipped = next(step for step, f in frames if abs(f["omegay"][0]) > 0.03)
+        angle = edge - 1.5 + 0.5 * (tipped - fast) * dt
+        print(f"    tips at {angle:.2f} degrees (statics {edge:.2f})", flush=True)
+        self.assertGreater(angle, edge - 0.1)
+        self.assertLess(angle, edge + 0.4)
+
+
+class Sliding(unittest.TestCase):
+    def test_a_block_slides_without_chatter(self):
+        speed, mu = 2.0, 0.5
+        r = run([atom(1, (-2, 0, HALF[2] - sunk()))], 12000, velocities=[(1, speed, 0, 0, 0, 0, 0)], every=100)
+        frames = r.dump("out.dump")
+        x = np.array([f["x"][0] for _, f in frames])
+        # Friction sets in at once and lets go at once: between, no trace of the box's own vibrations.
+        spin = np.array([max(abs(f["omegax"][0]), abs(f["omegay"][0]), abs(f["omegaz"][0]))
+                         for _, f in frames[40:78]])
+        way = speed**2 / (2 * mu * G)
+        print(f"    sliding block: way {x[-1] + 2:.6f} m (closed {way:.6f}), largest spin {spin.max():.1e} rad/s",
+              flush=True)
+        self.assertAlmostEqual(x[-1] + 2, way, delta=2e-3 * way)
+        self.assertLess(spin.max(), 1e-5)
+        self.assertLess(r.thermo["kinetic"][-1] / (0.5 * MASS * speed**2), 1e-8)
+
+
+class Ranks(unittest.TestCase):
+    def test_the_same_on_two_ranks(self):
+        atoms = [atom(k + 1, (1.3 * (k % 2) - 0.6, 0.3 * (k // 2), 0.4 + 0.75 * (k // 2)), turned((1, k, 2), 20 * k))
+                 for k in range(6)]
+        one, two = (run(atoms, 20000, ranks=n).dump("out.dump")[-1][1] for n in (1, 2))
+        for column in ("x", "y", "z", "vx", "omegaz"):
+            np.testing.assert_array_equal(one[column], two[column])
+
+
+if __name__ == "__main__":
+    unittest.main(verbosity=1)
