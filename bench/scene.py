@@ -127,7 +127,7 @@ class Run:
                                            stderr=subprocess.STDOUT, stdin=subprocess.DEVNULL)
                 self.rss, core = 0, 1.0
                 while process.poll() is None:
-                    time.sleep(0.02)
+                    time.sleep(0.05)
                     self.rss = peak_memory(process.pid) or self.rss
                     core = share_of_core(process.pid) or core
                 screen.seek(0)
