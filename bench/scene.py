@@ -2,7 +2,7 @@
 """Times whole steps of beds of particles, at rest and tumbling, side by side, interleaved, on this machine.
 
     bench/scene.py [--quick] [--only CASE,..] [--n 1000,8000] [--ranks 1,2] [--state rest,tumbling] [--repeats R]
-                   [--seconds S] [--program NAME=PATH ..] [--beds DIR] [--output CSV]
+                   [--seconds S] [--program NAME=PATH ..] [--beds DIR] [--output CSV [--keep]]
     bench/scene.py --tolerances [1e-2,1e-4,..] [--only CASE,..] [--output CSV]    cost and observables over `tolerance`
     bench/scene.py --plot CSV                                                     draws a CSV again
 
@@ -127,7 +127,7 @@ class Run:
                                            stderr=subprocess.STDOUT, stdin=subprocess.DEVNULL)
                 self.rss, core = 0, 1.0
                 while process.poll() is None:
-                    time.sleep(0.02)
+                    time.sleep(0.05)
                     self.rss = peak_memory(process.pid) or self.rss
                     core = share_of_core(process.pid) or core
                 screen.seek(0)
@@ -390,6 +390,13 @@ def add_ratios(jobs, rows):
                 row[column] = statistics.median(ratios) if case == "sphere" else 1 / statistics.median(ratios)
 
 
+def earlier_rows(file, jobs):
+    """Rows of an earlier CSV that are not measured again."""
+    again = {(job.name, job.case, job.state, str(job.bed.count), str(job.ranks)) for job in jobs}
+    mine = lambda row: tuple(row[key] for key in ("program", "case", "state", "n", "ranks"))  # noqa: E731
+    return [row for row in read(file)[1] if mine(row) not in again] if file.exists() else []
+
+
 def write(rows, columns, file, note):
     file.parent.mkdir(parents=True, exist_ok=True)
     with open(file, "w", newline="") as stream:
@@ -423,6 +430,7 @@ def table(options):
             counts[job] = here
             counts.setdefault((shape, job.state, job.bed.count), here)
     empty = {program: empty_memory(program) for program in {job.program for job in jobs}}
+    kept = earlier_rows(options.output, jobs) if options.keep else []
     for repeat in range(options.repeats):
         for job in jobs:
             run = job.time(steps_for(job.case, job.state, job.bed.count, options.seconds))
@@ -431,7 +439,7 @@ def table(options):
         shared = [counts.get(job) or counts.get((CASES[job.case][1], job.state, job.bed.count)) for job in jobs]
         rows = [job.row(here, empty[job.program]) for job, here in zip(jobs, shared)]
         add_ratios(jobs, rows)
-        write(rows, COLUMNS, options.output, f"median of {repeat + 1} interleaved runs")
+        write(kept + rows, COLUMNS, options.output, f"median of {repeat + 1} interleaved runs")
     show(rows)
     draw_table(options.output)
 
@@ -450,6 +458,7 @@ def arguments():
     parser.add_argument("--tolerances", type=words, nargs="?", const=[f"1e-{k}" for k in range(2, 13, 2)])
     parser.add_argument("--program", action="append", default=[], metavar="NAME=PATH")
     parser.add_argument("--beds", type=pathlib.Path, default=deck.BUILD / "scene")
+    parser.add_argument("--keep", action="store_true", help="keep rows of OUTPUT that are not measured again")
     parser.add_argument("--output", type=pathlib.Path)
     parser.add_argument("--plot", type=pathlib.Path, metavar="CSV")
     options = parser.parse_args()
