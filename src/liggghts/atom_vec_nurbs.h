@@ -45,7 +45,9 @@ class AtomVecNurbs : public AtomVec {
   // counts, so that any command or fix may set it. The momentum it was last made from is kept, and is used as
   // long as omega, orientation and size are to the last bit what they were then, so that a free particle
   // keeps its momentum to the last bit.
-  nurbs::Vec3 angular_momentum(int i) const { return spin_is_kept(i) ? kept_momentum(i) : momentum_of_spin(i); }
+  nurbs::Vec3 angular_momentum(int i) const {
+    return spin_is_kept(i) ? kept_momentum(i) : momentum_of_spin(i);
+  }
 
   // The two halves of a step, after the angular momentum was kept by keep_momentum(i), of owned particles
   // `list` that share a shape: `count` of them, at most RotorBatch::kBodies. Turns them for a time dt at

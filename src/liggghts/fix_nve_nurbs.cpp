@@ -93,7 +93,8 @@ void FixNVENurbs::initial_integrate(int) {
 
 void FixNVENurbs::final_integrate() {
   auto& bodies = static_cast<AtomVecNurbs&>(*atom->avec);
-  sweep([&](int i) { kick(bodies, i); }, [&](const int* list, int count) { bodies.update_omega(list, count); });
+  sweep([&](int i) { kick(bodies, i); },
+        [&](const int* list, int count) { bodies.update_omega(list, count); });
 }
 
 }  // namespace LAMMPS_NS
