@@ -15,6 +15,7 @@
 #include "body/support.h"
 #include "contact/direction_search.h"
 #include "contact/pair_search.h"
+#include "motion/rotor.h"
 #include "nurbs/bezier_patch.h"
 
 namespace nurbs::bench {
@@ -265,6 +266,51 @@ void cold(benchmark::State& state, int which, Solver solver) {
   }
 }
 
+// One body's part of a step: both half kicks of velocity and angular momentum, the drift of place and
+// orientation, and the angular velocity at both ends, eight bodies a time. Free but for a small torque.
+void integration(benchmark::State& state, int which) {
+  struct Moving {
+    Vec3 x, v, force, momentum, torque, omega;
+    Quat q;
+  };
+  constexpr int kBatch = RotorBatch::kBodies, kBodyCount = 32 * kBatch;
+  constexpr double dt = kTurn;  // at unit spin
+  const Shape& shape = *scene(which).body->shape;
+  const Rotor rotor = make_rotor(shape.principal_gyration, shape.principal_axes);
+  Random random(13);
+  std::vector<Moving> bodies;
+  for (int k = 0; k < kBodyCount; ++k)
+    bodies.push_back({random.direction(), random.direction(), random.direction(),
+                      shape.principal_gyration[1] * random.direction(), 1e-3 * random.direction(),
+                      Vec3::Zero(), Quat(Eigen::AngleAxisd(random.uniform(0, 3), random.direction()))});
+  RotorBatch batch;
+  const auto kick = [&](Moving* first) {
+    for (int lane = 0; lane < kBatch; ++lane) {
+      first[lane].v += 0.5 * dt * first[lane].force;
+      first[lane].momentum += 0.5 * dt * first[lane].torque;
+      batch.set_momentum(lane, first[lane].momentum);
+      batch.set_q(lane, first[lane].q);
+    }
+  };
+  int k = 0;
+  while (state.KeepRunningBatch(kBatch)) {
+    Moving* first = &bodies[k];
+    k = (k + kBatch) % kBodyCount;
+    kick(first);
+    drift(rotor, dt, &batch);
+    for (int lane = 0; lane < kBatch; ++lane) {
+      first[lane].x += dt * first[lane].v;
+      first[lane].q = batch.get_q(lane);
+      first[lane].omega = batch.get_velocity(lane);
+    }
+    benchmark::ClobberMemory();
+    kick(first);
+    find_angular_velocity(rotor, &batch);
+    for (int lane = 0; lane < kBatch; ++lane) first[lane].omega = batch.get_velocity(lane);
+    benchmark::ClobberMemory();
+  }
+}
+
 // --- rows
 // ---------------------------------------------------------------------------------------------------------
 
@@ -342,6 +388,7 @@ std::vector<std::string> register_all() {
     add("plane, resting", [=](benchmark::State& s) { plane(s, which, kRest); })
         ->UseManualTime()
         ->Iterations(kPaths);
+    add("integration", [=](benchmark::State& s) { integration(s, which); });
     add("cold", [=](benchmark::State& s) { cold(s, which, Solver::ladder); });
     add("cold cso", [=](benchmark::State& s) { cold(s, which, Solver::cso); });
   }

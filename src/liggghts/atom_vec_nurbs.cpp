@@ -153,13 +153,22 @@ void AtomVecNurbs::record_spin(int i) {
   made.size = size(i);
 }
 
-void AtomVecNurbs::load(const int* list, int count, RotorBatch* batch) const {
+void AtomVecNurbs::load_batch(const int* list, int count) {
   for (int lane = 0; lane < count; ++lane) {
     const int i = list[lane];
-    for (int k = 0; k < 4; ++k) batch->q[k][lane] = quaternion_[i][k];
-    for (int k = 0; k < 3; ++k) batch->momentum[k][lane] = angmom_[i][k];
-    batch->inverse_size[lane] = 1 / size(i);
+    for (int k = 0; k < 4; ++k) batch_.q[k][lane] = quaternion_[i][k];
+    for (int k = 0; k < 3; ++k) batch_.momentum[k][lane] = angmom_[i][k];
+    batch_.inverse_size[lane] = 1 / size(i);
   }
+}
+
+// From a lane of the batch to the particle and to its record.
+void AtomVecNurbs::store_omega(int i, int lane) {
+  for (int k = 0; k < 3; ++k) omega_[i][k] = spin_[i].omega[k] = batch_.velocity[k][lane];
+}
+
+void AtomVecNurbs::store_q(int i, int lane) {
+  for (int k = 0; k < 4; ++k) quaternion_[i][k] = spin_[i].q[k] = batch_.q[k][lane];
 }
 
 void AtomVecNurbs::rotate(RotationScheme scheme, const int* list, int count, double dt) {
@@ -173,25 +182,24 @@ void AtomVecNurbs::rotate(RotationScheme scheme, const int* list, int count, dou
     update_omega(list, count);
     return;
   }
-  RotorBatch batch;
-  load(list, count, &batch);
-  nurbs::drift(shapes_.rotor(shapetype_[list[0]]), dt, &batch);
+  load_batch(list, count);
+  nurbs::drift(shapes_.rotor(shapetype_[list[0]]), dt, &batch_);
   for (int lane = 0; lane < count; ++lane) {
     const int i = list[lane];
-    for (int k = 0; k < 4; ++k) quaternion_[i][k] = batch.q[k][lane];
-    for (int k = 0; k < 3; ++k) omega_[i][k] = batch.velocity[k][lane];
-    record_spin(i);
+    store_omega(i, lane);
+    store_q(i, lane);
+    spin_[i].size = size(i);
   }
 }
 
 void AtomVecNurbs::update_omega(const int* list, int count) {
-  RotorBatch batch;
-  load(list, count, &batch);
-  nurbs::find_angular_velocity(shapes_.rotor(shapetype_[list[0]]), &batch);
+  load_batch(list, count);
+  nurbs::find_angular_velocity(shapes_.rotor(shapetype_[list[0]]), &batch_);
   for (int lane = 0; lane < count; ++lane) {
     const int i = list[lane];
-    for (int k = 0; k < 3; ++k) omega_[i][k] = batch.velocity[k][lane];
-    record_spin(i);
+    store_omega(i, lane);
+    store_q(i, lane);
+    spin_[i].size = size(i);
   }
 }
 

@@ -58,7 +58,9 @@ class AtomVecNurbs : public AtomVec {
   // The two halves of a step, after the angular momentum was kept by keep_momentum(i), of owned particles
   // `list` that share a shape: `count` of them, at most RotorBatch::kBodies. Turns them for a time dt at
   // constant angular momentum, and sets omega; sets omega alone.
-  void keep_momentum(int i, const nurbs::Vec3& momentum) { nurbs::Vec3::Map(angmom_[i]) = momentum; }
+  void keep_momentum(int i, const nurbs::Vec3& momentum) {
+    for (int k = 0; k < 3; ++k) angmom_[i][k] = momentum[k];
+  }
   void rotate(nurbs::RotationScheme scheme, const int* list, int count, double dt);
   void update_omega(const int* list, int count);
 
@@ -119,9 +121,11 @@ class AtomVecNurbs : public AtomVec {
   };
   double size(int i) const { return rmass_[i] * scale_[i] * scale_[i]; }
   bool spin_is_kept(int i) const;
-  nurbs::Vec3 kept_momentum(int i) const { return nurbs::Vec3::Map(angmom_[i]); }
+  nurbs::Vec3 kept_momentum(int i) const { return {angmom_[i][0], angmom_[i][1], angmom_[i][2]}; }
   nurbs::Vec3 momentum_of_spin(int i) const;
-  void load(const int* list, int count, nurbs::RotorBatch* batch) const;
+  void load_batch(const int* list, int count);
+  void store_omega(int i, int lane);
+  void store_q(int i, int lane);
   void record_spin(int i);
 
   void put_quaternion(int i, const nurbs::Quat& q);
@@ -156,6 +160,8 @@ class AtomVecNurbs : public AtomVec {
   double *radius_ = nullptr, *density_ = nullptr, *rmass_ = nullptr;
   double* scale_ = nullptr;
   std::vector<SpinRecord> spin_;
+
+  nurbs::RotorBatch batch_;  // scratch
 };
 
 inline bool AtomVecNurbs::spin_is_kept(int i) const {

@@ -27,8 +27,6 @@ RotationScheme parse_scheme(LAMMPS* lmp, const std::string& name) {
                        "Fix nve/nurbs rotation " + name + " must be symplectic, richardson or exact");
 }
 
-using Vec3Map = Eigen::Map<Vec3>;
-
 }  // namespace
 
 FixNVENurbs::FixNVENurbs(LAMMPS* lmp, int narg, char** arg) : FixNVE(lmp, narg, arg) {
@@ -54,10 +52,11 @@ int FixNVENurbs::group_count() const {
 }
 
 // Half a step of force and torque on particle i's velocity and angular momentum; omega does not follow yet.
-void FixNVENurbs::kick(int i) const {
-  auto& bodies = static_cast<AtomVecNurbs&>(*atom->avec);
-  Vec3Map(atom->v[i]) += dtf / atom->rmass[i] * Vec3Map(atom->f[i]);
-  bodies.keep_momentum(i, bodies.angular_momentum(i) + dtf * Vec3Map(atom->torque[i]));
+inline void FixNVENurbs::kick(AtomVecNurbs& bodies, int i) const {
+  const double *f = atom->f[i], *torque = atom->torque[i], per_mass = dtf / atom->rmass[i];
+  double* v = atom->v[i];
+  for (int k = 0; k < 3; ++k) v[k] += per_mass * f[k];
+  bodies.keep_momentum(i, bodies.angular_momentum(i) + dtf * Vec3(torque[0], torque[1], torque[2]));
 }
 
 // Does each(i) for every particle i of the group and then together(list, count) for all of them, in lists of
@@ -86,15 +85,16 @@ void FixNVENurbs::initial_integrate(int) {
   auto& bodies = static_cast<AtomVecNurbs&>(*atom->avec);
   sweep(
       [&](int i) {
-        kick(i);
-        Vec3Map(atom->x[i]) += dtv * Vec3Map(atom->v[i]);
+        kick(bodies, i);
+        for (int k = 0; k < 3; ++k) atom->x[i][k] += dtv * atom->v[i][k];
       },
       [&](const int* list, int count) { bodies.rotate(scheme_, list, count, dtv); });
 }
 
 void FixNVENurbs::final_integrate() {
   auto& bodies = static_cast<AtomVecNurbs&>(*atom->avec);
-  sweep([&](int i) { kick(i); }, [&](const int* list, int count) { bodies.update_omega(list, count); });
+  sweep([&](int i) { kick(bodies, i); },
+        [&](const int* list, int count) { bodies.update_omega(list, count); });
 }
 
 }  // namespace LAMMPS_NS

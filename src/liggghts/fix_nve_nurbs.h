@@ -18,6 +18,8 @@ FixStyle(nve/nurbs,FixNVENurbs)
 
 namespace LAMMPS_NS {
 
+class AtomVecNurbs;
+
 class FixNVENurbs : public FixNVE {
  public:
   FixNVENurbs(LAMMPS* lmp, int narg, char** arg);
@@ -34,7 +36,7 @@ class FixNVENurbs : public FixNVE {
   };
 
   int group_count() const;
-  void kick(int i) const;
+  void kick(AtomVecNurbs& bodies, int i) const;
   template <class Each, class Together>
   void sweep(Each each, Together together);
 

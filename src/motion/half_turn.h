@@ -18,8 +18,8 @@ HalfTurn<double> half_turn_any(double square);
 // Of half angles x given by square = x * x >= 0, rad^2; NaN and infinity give NaN. The rotation by the vector
 // r is the quaternion (cosine, sinc * r / 2) at square = |r|^2 / 4.
 //
-// Below half a radian Taylor series: what they leave out is below 1e-21, so both numbers are good to 1 ulp, at
-// 8 fused products each. A lane beyond goes through the library. What a lane gets does not depend on the
+// Below half a radian Taylor series: what they leave out is below 1e-21, so both numbers are good to 1 ulp,
+// at 8 fused products each. A lane beyond goes through the library. What a lane gets does not depend on the
 // others.
 template <class Lane>
 NURBS_INLINE void half_turn(const Lane& square, HalfTurn<Lane>* out) {

@@ -24,8 +24,8 @@ enum class RotationScheme {
 // about L commutes with all else, and a rotation about each of the two other principal axes, composed
 // symmetrically (Dullweber, Leimkuhler & McLachlan, J. Chem. Phys. 107 (1997) 5840; this splitting: Fasso, J.
 // Comput. Phys. 189 (2003) 527). Exact for spheres and symmetric tops. rotor.h has it for many steps of many
-// bodies, at a tenth of the cost. richardson: LAMMPS's scheme, but each of its Euler steps is a rotation and not a normalised sum, so that a rotation
-// about a principal axis is exact. exact: see free_rotor.h.
+// bodies, at a tenth of the cost. richardson: LAMMPS's scheme, but each of its Euler steps is a rotation and
+// not a normalised sum, so that a rotation about a principal axis is exact. exact: see free_rotor.h.
 void rotate_free(RotationScheme scheme, const Vec3& principal_inertia, const Quat& principal_axes, double dt,
                  Quat& q, const Vec3& angular_momentum);
 

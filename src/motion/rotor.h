@@ -10,8 +10,8 @@
 
 namespace nurbs {
 
-// Principal moments, as inverses, their axes ordered for the splitting. The kinetic energy of angular momentum
-// l along these axes is (middle * |l|^2 + first * l0^2 + second * l1^2) / (2 * size).
+// Principal moments, as inverses, their axes ordered for the splitting. The kinetic energy of angular
+// momentum l along these axes is (middle * |l|^2 + first * l0^2 + second * l1^2) / (2 * size).
 struct Rotor {
   enum class Kind {
     sphere,  // all moments equal: first = second = 0
@@ -24,8 +24,8 @@ struct Rotor {
   Mat3 axes = Mat3::Identity();  // columns: axes of first, second, middle, in shape axes; right-handed
 };
 
-// `moments` > 0, any order, about the axes that `principal_axes` turns the shape's into. Moments that agree to
-// 1e-13, a shape's round-off, count as equal: an error of at most 1e-13 of the angle turned through.
+// `moments` > 0, any order, about the axes that `principal_axes` turns the shape's into. Moments that agree
+// to 1e-13, a shape's round-off, count as equal: an error of at most 1e-13 of the angle turned through.
 Rotor make_rotor(const Vec3& moments, const Quat& principal_axes);
 
 // Bodies of one Rotor side by side. Lanes in use hold valid numbers; the others may hold any, and are best
@@ -51,8 +51,8 @@ struct RotorBatch {
 // principal axes, first - second - first. A sphere has only the former, a top only one of the latter. q stays
 // unit to round-off however often this is done; one that is not unit is made so.
 //
-// Nothing here depends on other lanes or on the vector width. ~5, 8, 12 ns a body (sphere, top, asymmetric) on
-// AVX-512, 1.5 times that on AVX2, as long as it turns less than a radian.
+// Nothing here depends on other lanes or on the vector width. ~5, 8, 12 ns a body (sphere, top, asymmetric)
+// on AVX-512, 1.5 times that on AVX2, as long as it turns less than a radian.
 void drift(const Rotor& rotor, double dt, RotorBatch* batch);
 
 // Angular velocities of bodies at rest or not, from their momenta. ~3 ns a body.

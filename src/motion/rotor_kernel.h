@@ -52,10 +52,10 @@ NURBS_INLINE void to_shape(const Matrix<Lane>& m, const Vector<Lane>& v, Vector<
           m.xz * v.x + m.yz * v.y + m.zz * v.z};
 }
 
-// Component of v along column `column` of the shape's axes, and a vector given by its components.
+// Component of v along column `column` of the rotor's axes, and the vector of this length along it.
 template <class Lane>
-NURBS_INLINE Lane along(const Rotor& rotor, int column, const Vector<Lane>& v) {
-  return rotor.axes(0, column) * v.x + rotor.axes(1, column) * v.y + rotor.axes(2, column) * v.z;
+NURBS_INLINE void along(const Rotor& rotor, int column, const Vector<Lane>& v, Lane* out) {
+  *out = rotor.axes(0, column) * v.x + rotor.axes(1, column) * v.y + rotor.axes(2, column) * v.z;
 }
 
 template <class Lane>
@@ -202,14 +202,14 @@ NURBS_INLINE void drift(const Rotor& rotor, double dt, RotorBatch* batch, int la
   load(batch->inverse_size + lane, &inverse_size);
   const Lane time = inverse_size * dt;
 
-  Vector<Lane> l, excess;
-  Matrix<Lane> turn;
+  Vector<Lane> l{}, excess{};
+  Matrix<Lane> turn{};
   if (rotor.kind != Rotor::Kind::sphere) {
     Vector<Lane> in_shape;
     Quaternion<Lane> in_body, turned;
     to_matrix(q, &turn);
     to_shape(turn, momentum, &in_shape);
-    l.y = along(rotor, 1, in_shape);
+    along(rotor, 1, in_shape, &l.y);
     if (rotor.kind == Rotor::Kind::top) {
       AxisTurn<Lane> about;
       Vector<Lane> vector;
@@ -217,8 +217,8 @@ NURBS_INLINE void drift(const Rotor& rotor, double dt, RotorBatch* batch, int la
       times(rotor, 1, about.sine, &vector);
       in_body = {about.cosine, vector.x, vector.y, vector.z};
     } else {
-      l.x = along(rotor, 0, in_shape);
-      l.z = along(rotor, 2, in_shape);
+      along(rotor, 0, in_shape, &l.x);
+      along(rotor, 2, in_shape, &l.z);
       turn_in_body(rotor, time, &l, &in_body);
     }
     product(q, in_body, &turned);
@@ -243,19 +243,19 @@ NURBS_INLINE void drift(const Rotor& rotor, double dt, RotorBatch* batch, int la
 // As ::find_angular_velocity, of the bodies in lanes `lane` and following.
 template <class Lane>
 NURBS_INLINE void find_angular_velocity(const Rotor& rotor, RotorBatch* batch, int lane) {
-  Vector<Lane> momentum, l, excess;
+  Vector<Lane> momentum, l{}, excess{};
   Lane inverse_size;
   load_momentum(*batch, lane, &momentum);
   load(batch->inverse_size + lane, &inverse_size);
-  Matrix<Lane> turn;
+  Matrix<Lane> turn{};
   if (rotor.kind != Rotor::Kind::sphere) {
     Quaternion<Lane> q;
     Vector<Lane> in_shape;
     load_q(*batch, lane, &q);
     to_matrix(q, &turn);
     to_shape(turn, momentum, &in_shape);
-    l.y = along(rotor, 1, in_shape);
-    if (rotor.kind == Rotor::Kind::asymmetric) l.x = along(rotor, 0, in_shape);
+    along(rotor, 1, in_shape, &l.y);
+    if (rotor.kind == Rotor::Kind::asymmetric) along(rotor, 0, in_shape, &l.x);
     excess_velocity(rotor, l, &excess);
   }
   store_velocity(rotor, turn, momentum, excess, inverse_size, batch, lane);

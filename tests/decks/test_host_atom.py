@@ -177,6 +177,60 @@ class FreeMotion(unittest.TestCase):
                     np.testing.assert_array_equal(a[name], b[name], f"{name} at step {step}")
 
 
+class Momentum(unittest.TestCase):
+    """A free particle keeps its angular momentum; what a command sets between steps counts."""
+    ATOM = [(1, 1, 1, 1.0, 1000.0, 0.123, -0.456, 0.789, 0.5, -0.5, 0.1, 0.7)]
+    AT_REST = [(1, 0.0, 0.0, 0.0, 5.0, 30.0, 1e-2)]
+
+    def run_deck(self, commands):
+        text = HEADER + "read_data in.data\n" + motion(every=1) + commands
+        return deck.run_ok(text, files=files(self.ATOM, self.AT_REST))
+
+    def kept(self, run, name):
+        """The bytes of the angular momentum in a restart file: seven numbers after the position."""
+        data = (run.path / name).read_bytes()
+        at = data.index(np.array(self.ATOM[0][5:8]).tobytes())
+        return data[at + 7 * 8:at + 10 * 8]
+
+    def test_is_kept_to_the_last_bit(self):
+        for scheme in ("symplectic", "richardson", "exact"):
+            text = HEADER + "read_data in.data\n" + motion(f"rotation {scheme}", 5000)
+            text += "write_restart a.restart\nrun 5000\nwrite_restart b.restart\nrun 0\nwrite_restart c.restart\n"
+            run = deck.run_ok(text, files=files(self.ATOM, self.AT_REST))
+            first = self.kept(run, "a.restart")
+            self.assertEqual([self.kept(run, name) for name in ("b.restart", "c.restart")], [first, first])
+            momentum = angular_momentum(run.dump("dump.txt")[-1][1], 0, BOX)
+            np.testing.assert_allclose(np.frombuffer(first), momentum, rtol=0, atol=1e-14 * np.linalg.norm(momentum))
+
+    def test_omega_set_between_runs(self):
+        run = self.run_deck("run 30\nset atom 1 omegax 3\nset atom 1 omegay -20\nset atom 1 omegaz 1\nrun 30\n")
+        frames = [frame for _, frame in run.dump("dump.txt")]
+        momenta = np.array([angular_momentum(frame, 0, BOX) for frame in frames])
+        before, after = momenta[:31], momenta[-30:]
+        expected = dict(frames[30], omegax=[3], omegay=[-20], omegaz=[1])
+        expected = angular_momentum(expected, 0, BOX)
+        np.testing.assert_allclose(before, np.tile(before[0], (31, 1)), rtol=0, atol=1e-14 * np.linalg.norm(before[0]))
+        np.testing.assert_allclose(after, np.tile(expected, (30, 1)), rtol=0, atol=1e-14 * np.linalg.norm(expected))
+
+    def test_omega_set_within_a_run(self):
+        """`run every` gives its command between steps, without a new start. Stopped, the particle stays."""
+        stop = "".join(f'"set atom 1 omega{axis} 0" ' for axis in "xyz")
+        run = self.run_deck(f"run 40 every 10 {stop}\n")
+        frames = dict(run.dump("dump.txt"))
+        self.assertGreater(np.abs(quaternion(frames[10], 0) - quaternion(frames[0], 0)).max(), 0.1)
+        for step in (11, 20, 40):
+            np.testing.assert_array_equal(quaternion(frames[step], 0), quaternion(frames[10], 0))
+            np.testing.assert_array_equal(frames[step]["omegay"], 0)
+
+    def test_mass_or_size_set_between_runs(self):
+        """Omega stays, so that the momentum changes with the inertia."""
+        for command, factor in (("density 500", 0.5), (f"diameter {4 * np.linalg.norm(BOX):.17g}", 32)):
+            run = self.run_deck(f"run 30\nset atom 1 {command}\nrun 1\n")
+            frames = [frame for _, frame in run.dump("dump.txt")]
+            before, after = (angular_momentum(frames[k], 0, BOX) for k in (30, -1))
+            np.testing.assert_allclose(after, factor * before, rtol=0, atol=1e-5 * np.linalg.norm(after))
+
+
 class Files(unittest.TestCase):
     def section(self, text, name):
         lines = text.split(name + "\n\n")[1].split("\n\n")[0].splitlines()
