@@ -54,6 +54,7 @@ void Bodies::update(int i, double dt, bool renumbered) {
   store(p.x, r.x);
   r.radius = arrays_.radius[i];
   r.free = 1;
+  r.flat = shape.flats.empty() ? 0 : 1;
   const Mat3 turn = p.q.toRotationMatrix();
   Eigen::Map<Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>{r.turn} = turn;
   const Vec3 spin = Vec3::Map(arrays_.spin + 3 * i);

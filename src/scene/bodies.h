@@ -43,7 +43,8 @@ struct alignas(64) BodyRecord {
   double turn[9];  // shape axes into lab axes, by rows
   double radius;   // of the bounding sphere
   double free;     // 1; 0 for a wall, whose contact normal is its own whatever touches it
-  double spare[2];
+  double flat;     // 1 if the body has flat features (body/flat_faces.h)
+  double spare;
   double velocity[3], spin[3], spin_before[3];  // see BodyMotion
   double inverse_mass, inverse_inertia[6];      // xx yy zz xy xz yz, lab
 };

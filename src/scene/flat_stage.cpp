@@ -52,11 +52,7 @@ void take_over(const ContactCoefficients& law, const ContactGeometry& g, const B
 }  // namespace
 
 bool ContactStages::may_be_flat(int a, int b) const {
-  const auto has = [this](int i) {
-    const BodyArrays& arrays = step_.bodies->arrays();
-    return !arrays.shapes[arrays.shape[i]]->flats.empty();
-  };
-  return step_.settings.solver == Solver::ladder && has(b) && (a < 0 || has(a));
+  return record(b).flat != 0 && (a < 0 || record(a).flat != 0) && step_.settings.solver == Solver::ladder;
 }
 
 // Energy that left the springs.
