@@ -14,8 +14,8 @@ constexpr int kWidth = 8;
 #else
 constexpr int kWidth = 4;
 #endif
-using Wide = double __attribute__((vector_size(8 * kWidth)));
-using WideMask = long long __attribute__((vector_size(8 * kWidth)));
+using Mask4 = long long __attribute__((vector_size(32)));
+using Mask8 = long long __attribute__((vector_size(64)));
 
 template <class Real>
 struct MaskOf;
@@ -24,33 +24,53 @@ struct MaskOf<double> {
   using type = bool;
 };
 template <>
-struct MaskOf<Wide> {
-  using type = WideMask;
+struct MaskOf<Lane4> {
+  using type = Mask4;
+};
+template <>
+struct MaskOf<Lane8> {
+  using type = Mask8;
 };
 template <class Real>
 using Mask = typename MaskOf<Real>::type;
 
+#ifdef __AVX512F__
+using Wide = Lane8;
+#else
+using Wide = Lane4;
+#endif
+using WideMask = Mask<Wide>;
+
 NURBS_INLINE double select(bool mask, double yes, double no) {
   return mask ? yes : no;
 }
-NURBS_INLINE Wide select(const WideMask& mask, const Wide& yes, const Wide& no) {
+NURBS_INLINE Lane4 select(const Mask4& mask, const Lane4& yes, const Lane4& no) {
+  return mask ? yes : no;
+}
+NURBS_INLINE Lane8 select(const Mask8& mask, const Lane8& yes, const Lane8& no) {
   return mask ? yes : no;
 }
 NURBS_INLINE double root(double x) {
   return std::sqrt(x);
 }
-NURBS_INLINE Wide root(const Wide& x) {
-  Wide r;
-  for (int k = 0; k < kWidth; ++k) r[k] = __builtin_sqrt(x[k]);
+NURBS_INLINE Lane4 root(const Lane4& x) {
+  Lane4 r;
+  for (int k = 0; k < 4; ++k) r[k] = __builtin_sqrt(x[k]);
+  return r;
+}
+NURBS_INLINE Lane8 root(const Lane8& x) {
+  Lane8 r;
+  for (int k = 0; k < 8; ++k) r[k] = __builtin_sqrt(x[k]);
   return r;
 }
 NURBS_INLINE bool none_of(bool mask) {
   return !mask;
 }
-NURBS_INLINE bool none_of(const WideMask& mask) {
-  long long any = 0;
-  for (int k = 0; k < kWidth; ++k) any |= mask[k];
-  return any == 0;
+NURBS_INLINE bool none_of(const Mask4& mask) {
+  return (mask[0] | mask[1] | mask[2] | mask[3]) == 0;
+}
+NURBS_INLINE bool none_of(const Mask8& mask) {
+  return (mask[0] | mask[1] | mask[2] | mask[3] | mask[4] | mask[5] | mask[6] | mask[7]) == 0;
 }
 template <class Real>
 NURBS_INLINE Real larger(const Real& a, const Real& b) {
