@@ -114,14 +114,14 @@ bool clip_segment(const ConvexPolygon& window, const Vec2& p, const Vec2& q, dou
   return part->t1 > part->t0;
 }
 
-int thin(const ConvexPolygon& polygon, int most, int lead, int guard, int* kept) {
+int thin(const ConvexPolygon& polygon, int most, int lead, int* kept) {
   int list[ConvexPolygon::kMost];
   int count = polygon.count;
   for (int i = 0; i < count; ++i) list[i] = (lead + i) % polygon.count;
   while (count > most) {
     double least = std::numeric_limits<double>::infinity();
-    int drop = 1 + guard;
-    for (int i = 1 + guard; i < count - guard; ++i) {
+    int drop = 1;
+    for (int i = 1; i < count; ++i) {
       const Vec2& at = polygon.corner[list[i]];
       const double area =
           cross2(at - polygon.corner[list[i - 1]], polygon.corner[list[i + 1 < count ? i + 1 : 0]] - at);

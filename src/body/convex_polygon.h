@@ -54,10 +54,9 @@ struct SegmentPart {
 bool clip_segment(const ConvexPolygon& window, const Vec2& p, const Vec2& q, double slack, SegmentPart* part);
 
 // Indices, ascending, of at most `most` corners to keep: the corner whose triangle with its neighbours is
-// least goes first (Visvalingam & Whyatt 1993), ties within 1e-6 going to the one counted first from `lead`.
-// `lead` and `guard` corners on either side of it stay (2 guard + 1 < most). Without guard a regular polygon
-// stays regular where it can. Returns how many. O(n^2).
-int thin(const ConvexPolygon& polygon, int most, int lead, int guard, int* kept);
+// least goes first (Visvalingam & Whyatt 1993), ties within 1e-6 going to the one counted first from `lead`,
+// which stays. A regular polygon keeps regular where it can. Returns how many. O(n^2).
+int thin(const ConvexPolygon& polygon, int most, int lead, int* kept);
 
 // Weights w > 0 of the corners, sum 1, whose centre sum_i w_i corner_i is `centre`. With the polygon's own
 // centroid c they are those of a uniform load, w_i = (A_(i-1) + A_i) / (2 A), A_i the triangle c, corner i,

@@ -268,7 +268,7 @@ class Finder {
     ConvexPolygon polygon;
     for (const int v : face.outline) polygon.add(face.project(out_.vertices[v]), 0, 0);
     int kept[ConvexPolygon::kMost];
-    const int count = thin(polygon, kContactPoints, 0, 0, kept);
+    const int count = thin(polygon, kContactPoints, 0, kept);
     for (int i = 0; i < count; ++i) face.corners.push_back(face.outline[kept[i]]);
   }
 

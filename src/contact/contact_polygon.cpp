@@ -97,8 +97,9 @@ void set_point(const Candidates& from, int i, double weight, ContactPolygon* out
   out->id[out->count++] = from.id[i];
 }
 
-// Thins and weighs; false when all of it is smaller than `least`. `centre`: of the load, null: the centroid.
-bool finish(const Candidates& from, double overlap, double least, const Vec2* centre, ContactPolygon* out) {
+// Thins and weighs; false when all of it is smaller than `least`. `centre`: of a uniform load, null: the
+// centroid. `lead`: a point that stays, or -1.
+bool finish(const Candidates& from, double least, const Vec2* centre, int lead, ContactPolygon* out) {
   out->count = 0;
   int first = 0, second = 0;
   const double size = from.plane.count > 1 ? size_of(from.plane, &first, &second) : 0;
@@ -108,12 +109,8 @@ bool finish(const Candidates& from, double overlap, double least, const Vec2* ce
     set_point(from, second, 0.5, out);
     return true;
   }
-  const double* const end = from.gap + from.plane.count;
-  const double* const deepest = std::min_element(from.gap, end);
-  const bool tilted = *std::max_element(from.gap, end) - *deepest > kLeadShare * overlap;
   int kept[ConvexPolygon::kMost];
-  const int count = thin(from.plane, kContactPoints, tilted ? static_cast<int>(deepest - from.gap) : 0,
-                         tilted ? kLeadNeighbours : 0, kept);
+  const int count = thin(from.plane, kContactPoints, std::max(0, lead), kept);
   ConvexPolygon few;
   for (int i = 0; i < count; ++i) few.add(from.plane.corner[kept[i]], 0, 0);
   double weight[ConvexPolygon::kMost];
@@ -144,41 +141,77 @@ double gap_below(const Body& incident, const ReferencePlane& plane) {
   return plane.normal.dot(incident.frame.x - plane.origin) - incident.frame.scale * h - plane.level;
 }
 
-// A round outline is inscribed: the corner of it (shape axes) next to the support point moves there, provided
-// that the point lies within `tolerance` of the face's plane and next to the outline. A body that leans
-// stands on it.
-void move_corner_to(const Vec3& support, const FlatFace& face, double tolerance, Vec3* outline, int count) {
-  if (face.offset - face.normal.dot(support) > tolerance) return;
+// A round outline is inscribed: the corner of it (shape axes) next to a point of the body moves there,
+// provided that the point lies within `tolerance` of the face's plane and next to the outline. Returns which,
+// or -1.
+int move_corner_to(const Vec3& point, const FlatFace& face, double tolerance, Vec3* outline, int count) {
+  if (face.offset - face.normal.dot(point) > tolerance) return -1;
   int nearest = 0;
   for (int i = 1; i < count; ++i)
-    if ((outline[i] - support).squaredNorm() < (outline[nearest] - support).squaredNorm()) nearest = i;
+    if ((outline[i] - point).squaredNorm() < (outline[nearest] - point).squaredNorm()) nearest = i;
   const Vec3& next = outline[nearest + 1 < count ? nearest + 1 : 0];
-  if ((support - outline[nearest]).squaredNorm() > (next - outline[nearest]).squaredNorm()) return;
-  outline[nearest] = support;
+  if ((point - outline[nearest]).squaredNorm() > (next - outline[nearest]).squaredNorm()) return -1;
+  outline[nearest] = point;
+  return nearest;
 }
 
-// The corners of a face, shape axes, from outside: moved as above when the face is round and the body leans.
-// `height`(s): of a point above the plane it stands on, `support`(): the support point towards it.
-template <class Height, class Support>
-int standing_outline(const Shape& shape, const FlatFace& face, double overlap, double tolerance,
-                     const Height& height, const Support& support, Vec3* outline) {
+// Where an old contact presses on a body, shape axes; false without force.
+bool centre_of_force(const ContactPolygon* old, const BodyFrame& a, const BodyFrame& b, bool on_b,
+                     Vec3* centre) {
+  if (!old || old->count == 0) return false;
+  const PolygonState state = evaluate(*old, a, b);
+  Vec3 sum = Vec3::Zero();
+  double force = 0;
+  for (int i = 0; i < state.count; ++i) {
+    const double share = old->weight[i] * std::max(0.0, -state.gap[i]);
+    force += share;
+    sum += share * (on_b ? state.arm_b : state.arm_a)[i];
+  }
+  if (!(force > 0)) return false;
+  const BodyFrame& body = on_b ? b : a;
+  *centre = body.axes.transpose() * sum / (force * body.scale);
+  return true;
+}
+
+// A face to stand on, towards shape direction d.
+struct Standing {
+  Vec3 outline[kOutlinePoints];  // shape axes, from outside
   int count = 0;
+  int lead = -1;  // the corner moved to where a leaning body presses
+};
+
+// `height`(s): of a point above the plane; `load`: centre of force, null if unknown.
+template <class Height>
+Standing stand(const Shape& shape, const FlatFace& face, const Vec3& d, double overlap, double tolerance,
+               const Height& height, const Vec3* load) {
+  constexpr double kAside = 1e-4;  // rad: the support point in this direction lies on the rim
+  Standing s;
   double least = kInfinite, most = -kInfinite;
   for (const int v : face.outline) {
-    outline[count++] = shape.flats.vertices[v];
+    s.outline[s.count++] = shape.flats.vertices[v];
     least = std::min(least, height(shape.flats.vertices[v]));
     most = std::max(most, height(shape.flats.vertices[v]));
   }
-  if (face.round && most - least > kLeadShare * overlap)
-    move_corner_to(support(), face, tolerance, outline, count);
-  return count;
+  if (!face.round) return s;
+  Vec3 aside;
+  if (load) {
+    const Vec3 arm = *load - face.centroid;
+    aside = arm - face.normal.dot(arm) * face.normal;
+    if (aside.norm() < kLeadLoad * std::sqrt(face.area / M_PI)) return s;
+  } else {
+    aside = d - face.normal.dot(d) * face.normal;
+    if (most - least < kLeadShare * overlap) return s;
+  }
+  const Vec3 to = (face.normal + kAside * aside.normalized()).normalized();
+  s.lead = move_corner_to(find_hull_support(shape, to).point, face, tolerance, s.outline, s.count);
+  return s;
 }
 
 // One attempt at a pair's polygon with a given face as the reference.
 class FaceContact {
  public:
-  FaceContact(const Body& reference, const FlatFace& face, const Body& incident)
-      : reference_(reference), face_(face), incident_(incident) {
+  FaceContact(const Body& reference, const FlatFace& face, const Body& incident, const Vec3* load = nullptr)
+      : reference_(reference), face_(face), incident_(incident), load_(load) {
     plane_ = {reference.frame.x, reference.turned(face.normal), reference.turned(face.axis_u),
               reference.turned(face.axis_v()), reference.frame.scale * face.offset};
     slack_ = kClipSlack * std::max(reference.radius(), incident.radius());
@@ -193,7 +226,7 @@ class FaceContact {
     *swallowed = false;
     const double most = reach - overlap;
     if (!face_points(overlap, reach, swallowed) && !crease_points(most) && !line_points(most)) return false;
-    if (!finish(points_, overlap, reach, nullptr, out)) return false;
+    if (!finish(points_, reach, nullptr, lead_, out)) return false;
     out->reference = reference_.index;
     out->rolling = rolling_;
     out->factor = 1;
@@ -218,14 +251,12 @@ class FaceContact {
     // Counterclockwise seen from the incident body's outside is clockwise about the reference's normal.
     const int n = static_cast<int>(face.outline.size());
     const auto vertex = [&](int i) { return face.outline[n - 1 - i % n]; };
-    Vec3 outline[kOutlinePoints];
-    standing_outline(
-        *incident_.shape, face, overlap, reach / incident_.frame.scale,
-        [&](const Vec3& s) { return plane_.height(incident_.place(s)); },
-        [&] { return find_hull_support(*incident_.shape, incident_.turned_back(-plane_.normal)).point; },
-        outline);
+    const Standing standing = stand(
+        *incident_.shape, face, incident_.turned_back(-plane_.normal), overlap, reach / incident_.frame.scale,
+        [&](const Vec3& s) { return plane_.height(incident_.place(s)); }, load_);
     ConvexPolygon subject;
-    for (int i = 0; i < n; ++i) subject.add(plane_.project(incident_.place(outline[n - 1 - i])), 0, 0);
+    for (int i = 0; i < n; ++i)
+      subject.add(plane_.project(incident_.place(standing.outline[n - 1 - i])), 0, 0);
     const ConvexPolygon cut = intersect(subject, window_, slack_);
     if (cut.count < 3) return false;
     const Vec3 normal = incident_.turned(face.normal);
@@ -241,7 +272,9 @@ class FaceContact {
       *swallowed = *swallowed && others;
       if (own) {
         const int v = vertex(cut.side[i]);
-        const Vec3& point = outline[n - 1 - cut.side[i]];
+        const int k = n - 1 - cut.side[i];
+        const Vec3& point = standing.outline[k];
+        if (k == standing.lead) lead_ = i;
         points_.add(cut.corner[i], point, plane_.height(incident_.place(point)),
                     vertex_id(incident_.index, v));
         continue;
@@ -339,6 +372,8 @@ class FaceContact {
   double slack_;
   ConvexPolygon window_;  // the reference's outline
   Candidates points_;
+  const Vec3* load_;  // centre of force on the incident body, shape axes, or null
+  int lead_ = -1;
   bool whole_ = false;  // every point is the incident body's own
   int rolling_ = 0;
 };
@@ -386,7 +421,7 @@ bool line_contact(const Body& a, const Body& b, const Vec3& d, double overlap, d
     points.add(plane.project(x), b.to_shape(x), plane.height(x),
                cut ? vertex_id(0, on_a.vertex[at > 0 ? 1 : 0]) : vertex_id(1, on_b.vertex[i]));
   }
-  if (!points.within(reach - overlap) || !finish(points, overlap, reach, nullptr, out)) return false;
+  if (!points.within(reach - overlap) || !finish(points, reach, nullptr, -1, out)) return false;
   out->reference = 0;
   out->rolling = on_a.ruled || on_b.ruled ? 1 : 0;
   out->factor = 1;
@@ -409,7 +444,7 @@ BodyFrame plane_frame(const Vec3& origin) {
 }
 
 bool make_plane_polygon(const Particle& particle, const Vec3& origin, const Vec3& normal, double overlap,
-                        double reach, ContactPolygon* out) {
+                        double reach, const ContactPolygon* old, ContactPolygon* out) {
   *out = {};
   const Shape& shape = *particle.shape;
   if (shape.flats.empty()) return false;
@@ -421,21 +456,26 @@ bool make_plane_polygon(const Particle& particle, const Vec3& origin, const Vec3
   };
   Candidates points;
   Vec2 centre = Vec2::Zero();
+  int lead = -1;
   const bool face = set.face >= 0;
   if (face) {
     const FlatFace& f = shape.flats.faces[set.face];
-    Vec3 outline[kOutlinePoints];
-    const int count = standing_outline(
-        shape, f, overlap, reach / frame.scale, height, [&] { return set.support; }, outline);
-    for (int i = 0; i < count; ++i)
-      points.add(f.project(outline[i]), outline[i], height(outline[i]), vertex_id(1, f.outline[i]));
+    Vec3 load;
+    const bool loaded = centre_of_force(old, plane_frame(origin), frame, true, &load);
+    const Standing standing = stand(shape, f, frame.axes.transpose() * -normal, overlap, reach / frame.scale,
+                                    height, loaded ? &load : nullptr);
+    for (int i = 0; i < standing.count; ++i) {
+      const Vec3& s = standing.outline[i];
+      points.add(f.project(s), s, height(s), vertex_id(1, f.outline[i]));
+    }
+    lead = standing.lead;
     centre = f.project(f.centroid);
   } else {
     const double length = (set.point[1] - set.point[0]).norm();
     for (int i = 0; i < 2; ++i)
       points.add({i * length, 0}, set.point[i], height(set.point[i]), vertex_id(1, set.vertex[i]));
   }
-  if (!finish(points, overlap, reach / frame.scale, face ? &centre : nullptr, out)) return false;
+  if (!finish(points, reach / frame.scale, face ? &centre : nullptr, lead, out)) return false;
   out->rolling = set.ruled ? 1 : 0;
   out->factor = 1;
   store(normal, out->normal);
@@ -463,7 +503,9 @@ bool make_pair_polygon(const Particle& pa, const Particle& pb, const Vec3& norma
     if (!(depth[reference] <= most)) return false;
     const Body &owner = reference == 0 ? a : b, &other = reference == 0 ? b : a;
     const FlatFace& face = owner.shape->flats.faces[reference == 0 ? face_a : face_b];
-    return FaceContact(owner, face, other).make(overlap, reach, polygon, swallowed);
+    Vec3 load;
+    const bool loaded = centre_of_force(old, a.frame, b.frame, reference == 0, &load);
+    return FaceContact(owner, face, other, loaded ? &load : nullptr).make(overlap, reach, polygon, swallowed);
   };
   bool swallowed = false;
   if (attempt(first, out, &swallowed)) {

@@ -34,7 +34,8 @@
 //               support_gap (one support search) by outgrown(); only if that says so, remake. Where all
 //               points of a face are closed it can't be: beside a face the body falls away, and an octagon
 //               lacks 8 % of a rim's tilt at most.
-//     A remake that yields count = 0 hands back to the single point with factor continuity.
+//     A remake takes kKeptReach and hands over the old polygon. One that yields count = 0 hands back to the
+//     single point with factor continuity.
 //  4. match() tells from which old point every new one inherits its history (a spring xi_i is a displacement,
 //  the
 //     force w_i kt xi_i: copying it keeps the sum under a plain slide, whatever the weights).
@@ -49,16 +50,18 @@
 namespace nurbs {
 
 // --- tolerances
-constexpr double kReach = 3;          // overlaps by which points of one feature may lag behind the deepest.
-                                      // Statics needs 1: on the brink of tipping the far side is just open
+constexpr double kReach = 3;  // overlaps by which points of one feature may lag behind the deepest when the
+                              // contact is new (a box on the brink of tipping needs 1) ...
+constexpr double kKeptReach = 12;  // ... and when a polygon is remade (a disc standing on one point of its
+                                   // rim needs 6)
 constexpr double kSlideShare = 1e-3;  // of the polygon's size that cut points may slide before a remake: a
                                       // jump of the torque by 5e-4, of U by 1e-7
 constexpr double kReferenceShare = 0.05;  // of the overlap by which the other face must be the shallower one
                                           // to become the reference
-constexpr double kOutgrownShare = 0.1;    // of the overlap by which the body may be deeper than its points
-constexpr double kLeadShare = 0.1;   // lag, in overlaps, above which a body counts as leaning: a round face
-                                     // then keeps its deepest point and ...
-constexpr int kLeadNeighbours = 2;   // ... these beside it: it tips over its rim, not over an octagon
+constexpr double kOutgrownShare = 0.02;   // of the overlap by which the body may be deeper than its points
+constexpr double kLeadShare = 0.1;        // lag, in overlaps, above which a new contact counts as leaning
+constexpr double kLeadLoad = 0.5;  // way of the load from a face's centroid, in radii of a disc of its area,
+                                   // above which an old one does
 constexpr double kClipSlack = 1e-9;  // of the larger bounding radius: places that count as equal
 
 struct ContactPolygon {
@@ -90,9 +93,11 @@ BodyFrame plane_frame(const Vec3& origin);
 // The contact of a particle (B) with the plane through `origin` with unit `normal` towards the particle (A).
 // `overlap` is that of the deepest point. The face, crease or ruled line takes part whole if all its points
 // have gap <= reach - overlap; false and count = 0 where none does. A round face gives eight points of its
-// rim, one of them the deepest point when the body is tilted. About 2 us.
+// rim. Where the body leans, one of them is where the load is, so that it tips over its rim and not over the
+// side of an octagon: the rim point next to the centre of force of `old`, or the deepest one without `old`
+// (may be null). About 2 us.
 bool make_plane_polygon(const Particle& particle, const Vec3& origin, const Vec3& normal, double overlap,
-                        double reach, ContactPolygon* out);
+                        double reach, const ContactPolygon* old, ContactPolygon* out);
 
 // The contact of two particles touching with `normal` (A to B, lab) and `overlap`, as the ladder found them;
 // the normal need only be good to some degrees, as the faces supply theirs. Candidates for the reference are

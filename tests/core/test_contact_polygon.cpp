@@ -101,7 +101,8 @@ TEST(PlanePolygon, faces_lines_and_points) {
                                    about(spin, random.uniform(0, 6)) * c.turn, scale);
     const Vec3 normal = scene.q * Vec3::UnitZ();
     ContactPolygon polygon;
-    EXPECT_EQ(make_plane_polygon(p, scene.x, normal, overlap, kReach * overlap, &polygon), c.points > 0);
+    EXPECT_EQ(make_plane_polygon(p, scene.x, normal, overlap, kReach * overlap, nullptr, &polygon),
+              c.points > 0);
     ASSERT_EQ(polygon.count, c.points) << c.shape->name;
     EXPECT_EQ(polygon.rolling, c.rolling ? 1 : 0);
     if (c.points == 0) continue;
@@ -133,7 +134,7 @@ TEST(PlanePolygon, a_tilt_beyond_reach_leaves_one_edge_then_one_corner) {
     p.q = turn;
     p.x[2] = find_support(*p.shape, turn.conjugate() * -Vec3::UnitZ()).h - overlap;
     ContactPolygon polygon;
-    make_plane_polygon(p, Vec3::Zero(), Vec3::UnitZ(), overlap, kReach * overlap, &polygon);
+    make_plane_polygon(p, Vec3::Zero(), Vec3::UnitZ(), overlap, kReach * overlap, nullptr, &polygon);
     return polygon.count;
   };
   EXPECT_EQ(count(about(Vec3::UnitY(), 1.4e-3)), 4);  // 2.8e-3 over the length of 2
@@ -151,7 +152,8 @@ TEST(PlanePolygon, a_tilted_disc_keeps_its_lowest_point) {
     p.q = about(Vec3(std::cos(heading), std::sin(heading), 0), tilt);
     p.x[2] = find_support(*p.shape, p.q.conjugate() * -Vec3::UnitZ()).h - overlap;
     ContactPolygon polygon;
-    ASSERT_TRUE(make_plane_polygon(p, Vec3::Zero(), Vec3::UnitZ(), overlap, kReach * overlap, &polygon));
+    ASSERT_TRUE(
+        make_plane_polygon(p, Vec3::Zero(), Vec3::UnitZ(), overlap, kReach * overlap, nullptr, &polygon));
     EXPECT_EQ(polygon.count, 8);
     const PolygonState state = evaluate(polygon, plane_frame(Vec3::Zero()), body_frame(p));
     EXPECT_NEAR(state.least, -overlap, 1e-10);
@@ -398,7 +400,7 @@ TEST(PlanePolygon, a_rolling_line_has_a_potential) {
   p.x[2] = find_support(*p.shape, p.q.conjugate() * -Vec3::UnitZ()).h - overlap;
   const auto polygon_at = [&](const Particle& at) {
     ContactPolygon polygon;
-    EXPECT_TRUE(make_plane_polygon(at, Vec3::Zero(), Vec3::UnitZ(), overlap, 2 * overlap, &polygon));
+    EXPECT_TRUE(make_plane_polygon(at, Vec3::Zero(), Vec3::UnitZ(), overlap, 2 * overlap, nullptr, &polygon));
     return polygon;
   };
   const auto energy = [&](const Particle& at) {
@@ -426,7 +428,8 @@ TEST(ContactPolygon, hand_over_keeps_the_energy_and_relaxing_books_it) {
   p.q = about(Vec3(1, 1, 0), 1e-3);
   p.x[2] = find_support(*p.shape, p.q.conjugate() * -Vec3::UnitZ()).h - overlap;
   ContactPolygon polygon;
-  ASSERT_TRUE(make_plane_polygon(p, Vec3::Zero(), Vec3::UnitZ(), overlap, kReach * overlap, &polygon));
+  ASSERT_TRUE(
+      make_plane_polygon(p, Vec3::Zero(), Vec3::UnitZ(), overlap, kReach * overlap, nullptr, &polygon));
   const PolygonState state = evaluate(polygon, plane_frame(Vec3::Zero()), body_frame(p));
   const double single = 0.5 * overlap * overlap;
   polygon.factor = continuity_factor(single, polygon, state);
@@ -488,7 +491,7 @@ TEST(ContactPolygon, is_plain_data) {
   p.shape = cuboid().get();
   p.x[2] = 0.6 - 1e-4;
   ContactPolygon polygon, copy;
-  ASSERT_TRUE(make_plane_polygon(p, Vec3::Zero(), Vec3::UnitZ(), 1e-4, 3e-4, &polygon));
+  ASSERT_TRUE(make_plane_polygon(p, Vec3::Zero(), Vec3::UnitZ(), 1e-4, 3e-4, nullptr, &polygon));
   std::memcpy(&copy, &polygon, sizeof copy);
   const PolygonState x = evaluate(polygon, plane_frame(Vec3::Zero()), body_frame(p));
   const PolygonState y = evaluate(copy, plane_frame(Vec3::Zero()), body_frame(p));
