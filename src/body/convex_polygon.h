@@ -8,7 +8,7 @@
 
 namespace nurbs {
 
-constexpr int kOutlinePoints = 32;  // of a flat face: a round one is then inscribed to 0.5 % of its radius
+constexpr int kOutlinePoints = 64;  // of a flat face: a round one is then inscribed to 0.12 % of its radius
 constexpr int kContactPoints = 8;   // of a contact polygon
 
 // Corners counterclockwise. Side i runs from corner i to corner i + 1 and came from side `side[i]` of the
