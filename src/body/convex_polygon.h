@@ -35,9 +35,9 @@ inline double cross2(const Vec2& a, const Vec2& b) {
 double polygon_area(const ConvexPolygon& polygon);
 Vec2 polygon_centroid(const ConvexPolygon& polygon);  // its area must be > 0
 
-// Largest signed distance by which `at` is inside (> 0) the polygon: to the nearest of the lines through its
-// sides.
-double depth_inside(const ConvexPolygon& polygon, const Vec2& at);
+// How far the corners of `points` are inside the polygon, at least: signed distance to the nearest of the
+// lines through its sides, < 0 outside.
+double depth_inside(const ConvexPolygon& polygon, const ConvexPolygon& points);
 
 // `subject` cut by `window`, both of at most kOutlinePoints corners (Sutherland & Hodgman, Comm. ACM 17
 // (1974) 32). Corners of `subject` outside by less than `slack` (length) count as inside, and corners closer

@@ -312,12 +312,7 @@ class FaceContact {
   void set_room(ContactPolygon* out) const {
     int i = 0, j = 0;
     double room = kSlideShare * size_of(points_.plane, &i, &j);
-    if (whole_) {
-      double margin = kInfinite;
-      for (int k = 0; k < points_.plane.count; ++k)
-        margin = std::min(margin, depth_inside(window_, points_.plane.corner[k]));
-      room = std::max(room, margin);
-    }
+    if (whole_) room = std::max(room, depth_inside(window_, points_.plane));
     out->room = room;
   }
 

@@ -90,7 +90,8 @@ BodyFrame plane_frame(const Vec3& origin);
 
 // The contact of a particle (B) with the plane through `origin` with unit `normal` towards the particle (A).
 // The face, crease or ruled line takes part whole if all its points lag behind the deepest one by at most
-// `reach` (length); false and count = 0 where none does. About 2 us.
+// `reach` (length); false and count = 0 where none does. 0.8 us for a box, 2.5 us for a disc,
+// 11 us for a rounded box: mostly one support search from a cold start.
 bool make_plane_polygon(const Particle& particle, const Vec3& origin, const Vec3& normal, double reach,
                         ContactPolygon* out);
 
@@ -101,8 +102,9 @@ bool make_plane_polygon(const Particle& particle, const Vec3& origin, const Vec3
 // A, except that a face lying inside the other is incident. The incident face is clipped by the reference's
 // outline; if its clipped points are not all within reach, a crease, then a ruled line of the incident body,
 // is clipped instead. Without a face, two parallel lines give the segment they share, with A's line in the
-// reference plane. Crossing edges, and corners on faces, are single points: false, count = 0. 2 to 15 us, two
-// support searches of which on rounded bodies are the most.
+// reference plane. Crossing edges, and corners on faces, are single points: false, count = 0. 1.5 us
+// for two boxes, 15 to 30 us for discs and rounded boxes, of which support searches from cold starts are the
+// most.
 bool make_pair_polygon(const Particle& a, const Particle& b, const Vec3& normal, double overlap, double reach,
                        const ContactPolygon* old, ContactPolygon* out);
 
@@ -120,7 +122,7 @@ struct PolygonState {
   double energy = 0;           // U / (factor kn)
   double slid = 0;             // bound on any point's lateral motion over the reference since it was made
 };
-// About 10 ns a point; 0.2 us for a round face.
+// About 0.2 us, round faces included.
 PolygonState evaluate(const ContactPolygon& polygon, const BodyFrame& a, const BodyFrame& b);
 
 enum class PolygonVerdict { keep, open, moved, tilted };
