@@ -13,20 +13,39 @@ constexpr double kSameCentre = 1e-26;     // squared shift, relative to the squa
 constexpr double kSliver = 1e-10;         // squared width to length of a polygon too thin to shift across
 constexpr double kLeastWeight = 0.1;      // of a corner's own share, after moving the centre
 
-double signed_distance(const ConvexPolygon& polygon, int side, const Vec2& at) {
-  const Vec2& from = polygon.corner[side];
-  const Vec2 along = polygon.corner[polygon.next(side)] - from;
-  const double length = along.norm();
-  return length > 0 ? cross2(along, at - from) / length : std::numeric_limits<double>::infinity();
-}
+// The line through a side: distance(x) > 0 to its left.
+struct SideLine {
+  Vec2 normal = Vec2::Zero();
+  double offset = 0;
+
+  SideLine(const ConvexPolygon& polygon, int side) {
+    const Vec2& from = polygon.corner[side];
+    const Vec2 along = polygon.corner[polygon.next(side)] - from;
+    const double length = along.norm();
+    if (!(length > 0)) {  // a side without length cuts nothing off
+      offset = -std::numeric_limits<double>::infinity();
+      return;
+    }
+    normal = Vec2(-along[1], along[0]) / length;
+    offset = normal.dot(from);
+  }
+  double distance(const Vec2& x) const { return normal.dot(x) - offset; }
+};
 
 // Keeps what lies left of side `cut` of `window`.
-ConvexPolygon cut_by(const ConvexPolygon& subject, const ConvexPolygon& window, int cut, double slack) {
+void cut_by(ConvexPolygon& subject, const ConvexPolygon& window, int cut, double slack) {
+  const SideLine line(window, cut);
+  double distance[ConvexPolygon::kMost];
+  bool whole = true;
+  for (int i = 0; i < subject.count; ++i) {
+    distance[i] = line.distance(subject.corner[i]);
+    whole = whole && distance[i] >= -slack;
+  }
+  if (whole) return;
   ConvexPolygon out;
-  double here = subject.count > 0 ? signed_distance(window, cut, subject.corner[0]) : 0;
   for (int i = 0; i < subject.count; ++i) {
     const int j = subject.next(i);
-    const double there = signed_distance(window, cut, subject.corner[j]);
+    const double here = distance[i], there = distance[j];
     const bool in = here >= -slack, next_in = there >= -slack;
     if (in && out.count < ConvexPolygon::kMost) out.add(subject.corner[i], subject.owner[i], subject.side[i]);
     if (in != next_in && out.count < ConvexPolygon::kMost) {
@@ -37,9 +56,8 @@ ConvexPolygon cut_by(const ConvexPolygon& subject, const ConvexPolygon& window, 
       else
         out.add(at, subject.owner[i], subject.side[i]);
     }
-    here = there;
   }
-  return out;
+  subject = out;
 }
 
 // Drops sides shorter than `slack`: their second end then joins the sides before and after.
@@ -75,9 +93,12 @@ Vec2 polygon_centroid(const ConvexPolygon& p) {
   return p.corner[0] + sum / (3 * twice);
 }
 
-double depth_inside(const ConvexPolygon& polygon, const Vec2& at) {
+double depth_inside(const ConvexPolygon& polygon, const ConvexPolygon& points) {
   double least = std::numeric_limits<double>::infinity();
-  for (int i = 0; i < polygon.count; ++i) least = std::min(least, signed_distance(polygon, i, at));
+  for (int i = 0; i < polygon.count; ++i) {
+    const SideLine line(polygon, i);
+    for (int k = 0; k < points.count; ++k) least = std::min(least, line.distance(points.corner[k]));
+  }
   return least;
 }
 
@@ -87,7 +108,7 @@ ConvexPolygon intersect(const ConvexPolygon& subject, const ConvexPolygon& windo
     p.owner[i] = 0;
     p.side[i] = i;
   }
-  for (int i = 0; i < window.count && p.count > 0; ++i) p = cut_by(p, window, i, slack);
+  for (int i = 0; i < window.count && p.count > 0; ++i) cut_by(p, window, i, slack);
   merge_corners(p, slack);
   if (p.count < 3) p.count = 0;
   return p;
@@ -97,7 +118,8 @@ bool clip_segment(const ConvexPolygon& window, const Vec2& p, const Vec2& q, dou
                   SegmentPart* part) {
   *part = {};
   for (int i = 0; i < window.count; ++i) {
-    const double at_p = signed_distance(window, i, p), at_q = signed_distance(window, i, q);
+    const SideLine line(window, i);
+    const double at_p = line.distance(p), at_q = line.distance(q);
     const bool p_in = at_p >= -slack, q_in = at_q >= -slack;
     if (!p_in && !q_in) return false;
     if (p_in && q_in) continue;
@@ -114,14 +136,14 @@ bool clip_segment(const ConvexPolygon& window, const Vec2& p, const Vec2& q, dou
   return part->t1 > part->t0;
 }
 
-int thin(const ConvexPolygon& polygon, int most, int lead, int guard, int* kept) {
+int thin(const ConvexPolygon& polygon, int most, int lead, int* kept) {
   int list[ConvexPolygon::kMost];
   int count = polygon.count;
   for (int i = 0; i < count; ++i) list[i] = (lead + i) % polygon.count;
   while (count > most) {
     double least = std::numeric_limits<double>::infinity();
-    int drop = 1 + guard;
-    for (int i = 1 + guard; i < count - guard; ++i) {
+    int drop = 1;
+    for (int i = 1; i < count; ++i) {
       const Vec2& at = polygon.corner[list[i]];
       const double area =
           cross2(at - polygon.corner[list[i - 1]], polygon.corner[list[i + 1 < count ? i + 1 : 0]] - at);

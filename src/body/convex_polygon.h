@@ -8,7 +8,7 @@
 
 namespace nurbs {
 
-constexpr int kOutlinePoints = 32;  // of a flat face: a round one is then inscribed to 0.5 % of its radius
+constexpr int kOutlinePoints = 64;  // of a flat face: a round one is then inscribed to 0.12 % of its radius
 constexpr int kContactPoints = 8;   // of a contact polygon
 
 // Corners counterclockwise. Side i runs from corner i to corner i + 1 and came from side `side[i]` of the
@@ -35,9 +35,9 @@ inline double cross2(const Vec2& a, const Vec2& b) {
 double polygon_area(const ConvexPolygon& polygon);
 Vec2 polygon_centroid(const ConvexPolygon& polygon);  // its area must be > 0
 
-// Largest signed distance by which `at` is inside (> 0) the polygon: to the nearest of the lines through its
-// sides.
-double depth_inside(const ConvexPolygon& polygon, const Vec2& at);
+// How far the corners of `points` are inside the polygon, at least: signed distance to the nearest of the
+// lines through its sides, < 0 outside.
+double depth_inside(const ConvexPolygon& polygon, const ConvexPolygon& points);
 
 // `subject` cut by `window`, both of at most kOutlinePoints corners (Sutherland & Hodgman, Comm. ACM 17
 // (1974) 32). Corners of `subject` outside by less than `slack` (length) count as inside, and corners closer
@@ -54,10 +54,9 @@ struct SegmentPart {
 bool clip_segment(const ConvexPolygon& window, const Vec2& p, const Vec2& q, double slack, SegmentPart* part);
 
 // Indices, ascending, of at most `most` corners to keep: the corner whose triangle with its neighbours is
-// least goes first (Visvalingam & Whyatt 1993), ties within 1e-6 going to the one counted first from `lead`.
-// `lead` and `guard` corners on either side of it stay (2 guard + 1 < most). Without guard a regular polygon
-// stays regular where it can. Returns how many. O(n^2).
-int thin(const ConvexPolygon& polygon, int most, int lead, int guard, int* kept);
+// least goes first (Visvalingam & Whyatt 1993), ties within 1e-6 going to the one counted first from `lead`,
+// which stays. A regular polygon keeps regular where it can. Returns how many. O(n^2).
+int thin(const ConvexPolygon& polygon, int most, int lead, int* kept);
 
 // Weights w > 0 of the corners, sum 1, whose centre sum_i w_i corner_i is `centre`. With the polygon's own
 // centroid c they are those of a uniform load, w_i = (A_(i-1) + A_i) / (2 A), A_i the triangle c, corner i,

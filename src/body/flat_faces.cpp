@@ -267,8 +267,10 @@ class Finder {
   void thin_outline(FlatFace& face) const {
     ConvexPolygon polygon;
     for (const int v : face.outline) polygon.add(face.project(out_.vertices[v]), 0, 0);
+    face.weight.resize(face.outline.size());
+    corner_weights(polygon, face.project(face.centroid), face.weight.data());
     int kept[ConvexPolygon::kMost];
-    const int count = thin(polygon, kContactPoints, 0, 0, kept);
+    const int count = thin(polygon, kContactPoints, 0, kept);
     for (int i = 0; i < count; ++i) face.corners.push_back(face.outline[kept[i]]);
   }
 

@@ -26,6 +26,7 @@ struct FlatFace {
   bool round = false;            // `outline` is inscribed in the true outline, not equal to it
   std::vector<int> outline;      // vertices, counterclockwise from outside, at most kOutlinePoints
   std::vector<int> corners;      // at most kContactPoints of them, ascending in `outline`
+  std::vector<double> weight;    // of the outline's vertices under a uniform load, sum 1: corner_weights
 
   Vec3 axis_v() const { return normal.cross(axis_u); }
   Vec2 project(const Vec3& x) const { return {axis_u.dot(x), axis_v().dot(x)}; }
@@ -49,9 +50,9 @@ struct FlatFeatures {
 
 // A face's patches have all control points within kFlatness of one plane, are joined through links, and lie
 // on the body's convex hull. An outline of at most kOutlinePoints straight sides has exact corners; any other
-// is given by the points of the true boundary furthest along 32 equally spaced directions, so that a disc
-// gets regular polygons on its rim (the first of them where a patch begins). Needs patches, links, bounds and
-// atlas. Rulings are tested on a 9 x 9 grid per patch. Some ms, less without flat features.
+// is given by the points of the true boundary furthest along kOutlinePoints equally spaced directions, so
+// that a disc gets regular polygons on its rim (the first of them where a patch begins). Needs patches,
+// links, bounds and atlas. Rulings are tested on a 9 x 9 grid per patch. Some ms, less without flat features.
 FlatFeatures find_flat_features(const Shape& shape);
 
 // The face whose normal is nearest to unit d, if the angle's cosine is above `cosine`; -1 without one.

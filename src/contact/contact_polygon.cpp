@@ -39,7 +39,7 @@ struct Body {
   BodyFrame frame;
 
   Body(int i, const Particle& p, const Vec3& origin)
-      : index(i), shape(p.shape), frame{p.scale, p.x - origin, p.q.toRotationMatrix()} {}
+      : index(i), shape(p.shape), frame{p.scale, p.x - origin, p.q.toRotationMatrix(), p.shape} {}
   Vec3 place(const Vec3& s) const { return frame.x + frame.scale * (frame.axes * s); }
   Vec3 to_shape(const Vec3& x) const { return frame.axes.transpose() * (x - frame.x) / frame.scale; }
   Vec3 turned(const Vec3& s) const { return frame.axes * s; }
@@ -97,8 +97,9 @@ void set_point(const Candidates& from, int i, double weight, ContactPolygon* out
   out->id[out->count++] = from.id[i];
 }
 
-// Thins and weighs; false when all of it is smaller than `least`. `centre`: of the load, null: the centroid.
-bool finish(const Candidates& from, double overlap, double least, const Vec2* centre, ContactPolygon* out) {
+// Thins and weighs; false when all of it is smaller than `least`. `centre`: of a uniform load, null: the
+// centroid.
+bool finish(const Candidates& from, double least, const Vec2* centre, ContactPolygon* out) {
   out->count = 0;
   int first = 0, second = 0;
   const double size = from.plane.count > 1 ? size_of(from.plane, &first, &second) : 0;
@@ -108,12 +109,8 @@ bool finish(const Candidates& from, double overlap, double least, const Vec2* ce
     set_point(from, second, 0.5, out);
     return true;
   }
-  const double* const end = from.gap + from.plane.count;
-  const double* const deepest = std::min_element(from.gap, end);
-  const bool tilted = *std::max_element(from.gap, end) - *deepest > kLeadShare * overlap;
   int kept[ConvexPolygon::kMost];
-  const int count = thin(from.plane, kContactPoints, tilted ? static_cast<int>(deepest - from.gap) : 0,
-                         tilted ? kLeadNeighbours : 0, kept);
+  const int count = thin(from.plane, kContactPoints, 0, kept);
   ConvexPolygon few;
   for (int i = 0; i < count; ++i) few.add(from.plane.corner[kept[i]], 0, 0);
   double weight[ConvexPolygon::kMost];
@@ -139,39 +136,34 @@ void set_marks(const BodyFrame& reference, const BodyFrame& incident, ContactPol
   store(in_reference(out->far), out->mark[1]);
 }
 
+// The outline's points that sector i of a round face stands for: [first, last).
+struct Sector {
+  int first, last;
+};
+Sector sector(int i, int points) {
+  return {i * points / kContactPoints, (i + 1) * points / kContactPoints};
+}
+
+// A whole round face: eight sectors of its outline.
+void set_ring(const Shape& shape, int body, int face, ContactPolygon* out) {
+  const FlatFace& f = shape.flats.faces[face];
+  const int points = static_cast<int>(f.outline.size());
+  if (points < 2 * kContactPoints) return;
+  out->ring = face + 1;
+  out->count = kContactPoints;
+  for (int i = 0; i < kContactPoints; ++i) {
+    const Sector s = sector(i, points);
+    out->weight[i] = 0;
+    for (int k = s.first; k < s.last; ++k) out->weight[i] += f.weight[k];
+    const int middle = f.outline[(s.first + s.last) / 2];
+    store(shape.flats.vertices[middle], out->point[i]);
+    out->id[i] = vertex_id(body, middle);
+  }
+}
+
 double gap_below(const Body& incident, const ReferencePlane& plane) {
   const double h = find_hull_support(*incident.shape, incident.turned_back(-plane.normal)).h;
   return plane.normal.dot(incident.frame.x - plane.origin) - incident.frame.scale * h - plane.level;
-}
-
-// A round outline is inscribed: the corner of it (shape axes) next to the support point moves there, provided
-// that the point lies within `tolerance` of the face's plane and next to the outline. A body that leans
-// stands on it.
-void move_corner_to(const Vec3& support, const FlatFace& face, double tolerance, Vec3* outline, int count) {
-  if (face.offset - face.normal.dot(support) > tolerance) return;
-  int nearest = 0;
-  for (int i = 1; i < count; ++i)
-    if ((outline[i] - support).squaredNorm() < (outline[nearest] - support).squaredNorm()) nearest = i;
-  const Vec3& next = outline[nearest + 1 < count ? nearest + 1 : 0];
-  if ((support - outline[nearest]).squaredNorm() > (next - outline[nearest]).squaredNorm()) return;
-  outline[nearest] = support;
-}
-
-// The corners of a face, shape axes, from outside: moved as above when the face is round and the body leans.
-// `height`(s): of a point above the plane it stands on, `support`(): the support point towards it.
-template <class Height, class Support>
-int standing_outline(const Shape& shape, const FlatFace& face, double overlap, double tolerance,
-                     const Height& height, const Support& support, Vec3* outline) {
-  int count = 0;
-  double least = kInfinite, most = -kInfinite;
-  for (const int v : face.outline) {
-    outline[count++] = shape.flats.vertices[v];
-    least = std::min(least, height(shape.flats.vertices[v]));
-    most = std::max(most, height(shape.flats.vertices[v]));
-  }
-  if (face.round && most - least > kLeadShare * overlap)
-    move_corner_to(support(), face, tolerance, outline, count);
-  return count;
 }
 
 // One attempt at a pair's polygon with a given face as the reference.
@@ -192,10 +184,11 @@ class FaceContact {
       window_.add(plane_.project(reference_.place(reference_.vertex(v))), 0, 0);
     *swallowed = false;
     const double most = reach - overlap;
-    if (!face_points(overlap, reach, swallowed) && !crease_points(most) && !line_points(most)) return false;
-    if (!finish(points_, overlap, reach, nullptr, out)) return false;
+    if (!face_points(most, swallowed) && !crease_points(most) && !line_points(most)) return false;
+    if (!finish(points_, reach, nullptr, out)) return false;
     out->reference = reference_.index;
     out->rolling = rolling_;
+    if (whole_ && ring_ >= 0) set_ring(*incident_.shape, incident_.index, ring_, out);
     out->factor = 1;
     store(face_.normal, out->normal);
     out->offset = face_.offset;
@@ -210,7 +203,7 @@ class FaceContact {
                                  : crossing_id(side_of_incident, side_of_reference);
   }
 
-  bool face_points(double overlap, double reach, bool* swallowed) {
+  bool face_points(double most, bool* swallowed) {
     const FlatFeatures& flats = incident_.shape->flats;
     const int f = nearest_face(flats, incident_.turned_back(-plane_.normal), kFaceCosine);
     if (f < 0) return false;
@@ -218,20 +211,16 @@ class FaceContact {
     // Counterclockwise seen from the incident body's outside is clockwise about the reference's normal.
     const int n = static_cast<int>(face.outline.size());
     const auto vertex = [&](int i) { return face.outline[n - 1 - i % n]; };
-    Vec3 outline[kOutlinePoints];
-    standing_outline(
-        *incident_.shape, face, overlap, reach / incident_.frame.scale,
-        [&](const Vec3& s) { return plane_.height(incident_.place(s)); },
-        [&] { return find_hull_support(*incident_.shape, incident_.turned_back(-plane_.normal)).point; },
-        outline);
     ConvexPolygon subject;
-    for (int i = 0; i < n; ++i) subject.add(plane_.project(incident_.place(outline[n - 1 - i])), 0, 0);
+    for (int i = 0; i < n; ++i)
+      subject.add(plane_.project(incident_.place(incident_.vertex(vertex(i)))), 0, 0);
     const ConvexPolygon cut = intersect(subject, window_, slack_);
     if (cut.count < 3) return false;
     const Vec3 normal = incident_.turned(face.normal);
     const double level = incident_.frame.scale * face.offset - normal.dot(plane_.origin - incident_.frame.x);
     points_.plane.count = 0;
     whole_ = true;
+    if (face.round) ring_ = f;
     *swallowed = true;
     for (int i = 0; i < cut.count; ++i) {
       const int b = cut.before(i);
@@ -241,7 +230,7 @@ class FaceContact {
       *swallowed = *swallowed && others;
       if (own) {
         const int v = vertex(cut.side[i]);
-        const Vec3& point = outline[n - 1 - cut.side[i]];
+        const Vec3& point = incident_.vertex(v);
         points_.add(cut.corner[i], point, plane_.height(incident_.place(point)),
                     vertex_id(incident_.index, v));
         continue;
@@ -261,7 +250,7 @@ class FaceContact {
       }
       points_.add(at, incident_.to_shape(plane_.lift(at, height)), height, id);
     }
-    return points_.within(reach - overlap);
+    return points_.within(most);
   }
 
   // The part of a segment of the incident body over the reference face; false unless it is within reach.
@@ -323,12 +312,7 @@ class FaceContact {
   void set_room(ContactPolygon* out) const {
     int i = 0, j = 0;
     double room = kSlideShare * size_of(points_.plane, &i, &j);
-    if (whole_) {
-      double margin = kInfinite;
-      for (int k = 0; k < points_.plane.count; ++k)
-        margin = std::min(margin, depth_inside(window_, points_.plane.corner[k]));
-      room = std::max(room, margin);
-    }
+    if (whole_) room = std::max(room, depth_inside(window_, points_.plane));
     out->room = room;
   }
 
@@ -341,6 +325,7 @@ class FaceContact {
   Candidates points_;
   bool whole_ = false;  // every point is the incident body's own
   int rolling_ = 0;
+  int ring_ = -1;  // the incident face if it is round
 };
 
 // A crease or ruled line of a body that supports it in lab direction d, to `tolerance`.
@@ -386,7 +371,7 @@ bool line_contact(const Body& a, const Body& b, const Vec3& d, double overlap, d
     points.add(plane.project(x), b.to_shape(x), plane.height(x),
                cut ? vertex_id(0, on_a.vertex[at > 0 ? 1 : 0]) : vertex_id(1, on_b.vertex[i]));
   }
-  if (!points.within(reach - overlap) || !finish(points, overlap, reach, nullptr, out)) return false;
+  if (!points.within(reach - overlap) || !finish(points, reach, nullptr, out)) return false;
   out->reference = 0;
   out->rolling = on_a.ruled || on_b.ruled ? 1 : 0;
   out->factor = 1;
@@ -401,15 +386,15 @@ bool line_contact(const Body& a, const Body& b, const Vec3& d, double overlap, d
 }  // namespace
 
 BodyFrame body_frame(const Particle& particle) {
-  return {particle.scale, particle.x, particle.q.toRotationMatrix()};
+  return {particle.scale, particle.x, particle.q.toRotationMatrix(), particle.shape};
 }
 
 BodyFrame plane_frame(const Vec3& origin) {
-  return {1, origin, Mat3::Identity()};
+  return {1, origin, Mat3::Identity(), nullptr};
 }
 
-bool make_plane_polygon(const Particle& particle, const Vec3& origin, const Vec3& normal, double overlap,
-                        double reach, ContactPolygon* out) {
+bool make_plane_polygon(const Particle& particle, const Vec3& origin, const Vec3& normal, double reach,
+                        ContactPolygon* out) {
   *out = {};
   const Shape& shape = *particle.shape;
   if (shape.flats.empty()) return false;
@@ -424,19 +409,19 @@ bool make_plane_polygon(const Particle& particle, const Vec3& origin, const Vec3
   const bool face = set.face >= 0;
   if (face) {
     const FlatFace& f = shape.flats.faces[set.face];
-    Vec3 outline[kOutlinePoints];
-    const int count = standing_outline(
-        shape, f, overlap, reach / frame.scale, height, [&] { return set.support; }, outline);
-    for (int i = 0; i < count; ++i)
-      points.add(f.project(outline[i]), outline[i], height(outline[i]), vertex_id(1, f.outline[i]));
+    for (const int v : f.corners) {
+      const Vec3& s = shape.flats.vertices[v];
+      points.add(f.project(s), s, height(s), vertex_id(1, v));
+    }
     centre = f.project(f.centroid);
   } else {
     const double length = (set.point[1] - set.point[0]).norm();
     for (int i = 0; i < 2; ++i)
       points.add({i * length, 0}, set.point[i], height(set.point[i]), vertex_id(1, set.vertex[i]));
   }
-  if (!finish(points, overlap, reach / frame.scale, face ? &centre : nullptr, out)) return false;
+  if (!finish(points, reach / frame.scale, face ? &centre : nullptr, out)) return false;
   out->rolling = set.ruled ? 1 : 0;
+  if (face && shape.flats.faces[set.face].round) set_ring(shape, 1, set.face, out);
   out->factor = 1;
   store(normal, out->normal);
   out->room = kInfinite;
@@ -478,6 +463,37 @@ bool make_pair_polygon(const Particle& pa, const Particle& pb, const Vec3& norma
   return false;
 }
 
+namespace {
+
+// One sector of a round face: the mean overlap over its weight (negative), or its least gap if it is open, at
+// its centre of pressure (shape axes). gap = base + slope . x for a point x of the incident body.
+double sector_gap(const FlatFeatures& flats, int face, int i, double base, const Vec3& slope, Vec3* place,
+                  PolygonState* state, double* energy) {
+  const FlatFace& f = flats.faces[face];
+  const Sector s = sector(i, static_cast<int>(f.outline.size()));
+  Vec3 pressed = Vec3::Zero();
+  double force = 0, weight = 0, least = kInfinite;
+  for (int k = s.first; k < s.last; ++k) {
+    const Vec3& x = flats.vertices[f.outline[k]];
+    const double gap = base + slope.dot(x), share = f.weight[k] * std::max(0.0, -gap);
+    weight += f.weight[k];
+    force += share;
+    pressed += share * x;
+    *energy -= share * std::min(0.0, gap);
+    state->most = std::max(state->most, gap);
+    if (gap < least) {
+      least = gap;
+      *place = x;
+    }
+  }
+  state->least = std::min(state->least, least);
+  if (!(force > 0)) return least;
+  *place = pressed / force;
+  return -force / weight;
+}
+
+}  // namespace
+
 PolygonState evaluate(const ContactPolygon& polygon, const BodyFrame& a, const BodyFrame& b) {
   PolygonState state;
   state.count = polygon.count;
@@ -490,16 +506,30 @@ PolygonState evaluate(const ContactPolygon& polygon, const BodyFrame& a, const B
   const double level = reference.scale * polygon.offset;
   state.least = kInfinite;
   state.most = -kInfinite;
+  const Vec3 outward_on_incident = incident.scale * (incident.axes.transpose() * outward);
+  const double base = outward.dot(apart) - level;
+  double energy = 0;
   for (int i = 0; i < polygon.count; ++i) {
-    const Vec3 arm = incident.scale * (incident.axes * load(polygon.point[i]));
-    const double gap = outward.dot(apart + arm) - level;
+    Vec3 place;
+    double gap = 0;
+    if (polygon.ring > 0) {
+      gap = sector_gap(incident.shape->flats, polygon.ring - 1, i, base, outward_on_incident, &place, &state,
+                       &energy);
+    } else {
+      place = load(polygon.point[i]);
+      gap = base + outward_on_incident.dot(place);
+      const double overlap = std::max(0.0, -gap);
+      energy += polygon.weight[i] * overlap * overlap;
+      state.least = std::min(state.least, gap);
+      state.most = std::max(state.most, gap);
+    }
+    const Vec3 arm = incident.scale * (incident.axes * place);
     const Vec3 middle = arm - 0.5 * gap * outward;
     state.gap[i] = gap;
     (a_is_reference ? state.arm_b : state.arm_a)[i] = middle;
     (a_is_reference ? state.arm_a : state.arm_b)[i] = middle + apart;
-    state.least = std::min(state.least, gap);
-    state.most = std::max(state.most, gap);
   }
+  state.energy = 0.5 * energy;
   if (polygon.count > 0 && polygon.room < kInfinite) {
     const auto lateral = [&](int i, const double* mark) {
       const Vec3 x =
@@ -534,12 +564,7 @@ bool outgrown(const PolygonState& state, double support_gap) {
 }
 
 double stored_energy(const ContactPolygon& polygon, const PolygonState& state) {
-  double sum = 0;
-  for (int i = 0; i < polygon.count; ++i) {
-    const double overlap = std::max(0.0, -state.gap[i]);
-    sum += polygon.weight[i] * overlap * overlap;
-  }
-  return 0.5 * polygon.factor * sum;
+  return polygon.factor * state.energy;
 }
 
 double continuity_factor(double energy, const ContactPolygon& polygon, const PolygonState& state) {

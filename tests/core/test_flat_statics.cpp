@@ -69,7 +69,7 @@ struct Touch {
 
   bool make(const ContactResult& r, double reach, ContactPolygon* out) {
     return a ? make_pair_polygon(a->p, b->p, r.normal, -r.gap, reach, &polygon, out)
-             : make_plane_polygon(b->p, Vec3::Zero(), r.normal, -r.gap, reach, out);
+             : make_plane_polygon(b->p, Vec3::Zero(), r.normal, reach, out);
   }
 
   // Polygon or single point (state->count = 1) for this step.
@@ -96,7 +96,8 @@ struct Touch {
     }
     ContactPolygon next = {};
     const double energy = polygon.count > 0 ? stored_energy(polygon, state) : 0.5 * single * r.gap * r.gap;
-    if (make(r, std::max(kReach * -r.gap, law.typical), &next)) {
+    const double lag = polygon.count > 0 ? kKeptReach : kReach;
+    if (make(r, std::max(lag * -r.gap, law.typical), &next)) {
       const PolygonState now = evaluate(next, frame_a(), body_frame(b->p));
       int source[kContactPoints];
       Vec3 old[kContactPoints];
@@ -105,7 +106,9 @@ struct Touch {
       const bool fresh = polygon.count == 0 && single == 0;
       for (int i = 0; i < next.count; ++i)
         spring[i] = fresh ? Vec3(Vec3::Zero()) : old[polygon.count > 0 ? source[i] : 0];
-      next.factor = polygon.count > 0 ? polygon.factor : continuity_factor(energy, next, now);
+      // While it slides the jump is booked; a body that leans on other points keeps its force.
+      const bool slides = polygon.count > 0 && state.slid > polygon.room;
+      next.factor = slides ? polygon.factor : continuity_factor(energy, next, now);
       if (polygon.count > 0) booked += law.kn * (stored_energy(next, now) - energy);
       polygon = next;
       ++remakes;
@@ -132,7 +135,8 @@ struct Touch {
   void apply(const Law& law, double dt) {
     const PolygonState state = update(law);
     if (polygon.count > 0 && law.cn > 0) booked += law.kn * relax(polygon, state, dt / kRelaxation);
-    elastic = 0;
+    elastic = law.kn *
+              (polygon.count > 0 ? stored_energy(polygon, state) : 0.5 * single * state.least * state.least);
     const Vec3 spin_a = a ? a->spin() : Vec3::Zero(), spin_b = b->spin(), v_a = a ? a->v : Vec3::Zero();
     for (int i = 0; i < state.count; ++i) {
       if (!(state.gap[i] < 0)) {
@@ -160,7 +164,6 @@ struct Touch {
         a->force -= f;
         a->torque -= state.arm_a[i].cross(f);
       }
-      elastic += 0.5 * share * law.kn * state.gap[i] * state.gap[i];
     }
   }
 };
@@ -248,10 +251,11 @@ TEST(FlatStatics, bodies_dropped_on_a_plane_come_to_rest) {
     int points;
   };
   const Quat tilt = about(Vec3(0.5, 1, 0), 0.01);
-  const std::vector<Case> cases = {{block(), 0.6, tilt, 4},
-                                   {can(), 0.6, tilt, 8},
-                                   {soap(), 0.4, tilt, 4},
-                                   {block(), 0.3, tilt * about(Vec3::UnitY(), M_PI / 2), 4}};
+  const std::vector<Case> cases = {
+      {block(), 0.6, tilt, 4},
+      {can(), 0.6, about(Vec3(0.5, 1, 0), 1e-3), 8},  // more, and it wobbles round its rim for long
+      {soap(), 0.4, tilt, 4},
+      {block(), 0.3, tilt * about(Vec3::UnitY(), M_PI / 2), 4}};
   for (const Case& c : cases) {
     World w;
     const double fall = 0.1;
@@ -304,12 +308,12 @@ TEST(FlatStatics, a_stack_of_five_boxes_lies_still) {
   EXPECT_LT(w.kinetic(), 1e-18);
 }
 
-// Gravity turned slowly to `angle` (degrees) towards `heading`: how far the body leans in the end, rad.
+// Gravity turned slowly to `angle` (rad) towards `heading`: how far the body leans in the end, rad.
 double lean(World& w, Mover& body, double angle, double heading) {
   const double ramp = 20, hold = 25;
   const Quat start = body.p.q;
   for (int k = 0; k < (ramp + hold) / w.dt; ++k) {
-    const double t = angle * M_PI / 180 * std::min(1.0, k * w.dt / ramp);
+    const double t = angle * std::min(1.0, k * w.dt / ramp);
     w.gravity = Vec3(std::sin(t) * std::cos(heading), std::sin(t) * std::sin(heading), -std::cos(t));
     w.step();
     if (body.p.q.angularDistance(start) > 0.2) break;
@@ -317,21 +321,42 @@ double lean(World& w, Mover& body, double angle, double heading) {
   return body.p.q.angularDistance(start);
 }
 
+// The steepest slope on which a disc on a ring of springs stands: the largest over all leans of the angle at
+// which the centre of pressure is seen from the centre of mass, less the lean itself. `overlap`: m g / kn.
+double ring_tipping_angle(double radius, double height, double overlap) {
+  double best = 0;
+  for (double tilt = 1e-7; tilt < 0.1; tilt *= 1.02) {
+    // Closed arc of half angle e: mean overlap r tilt (sin e - e cos e) / pi, its moment r (e - sin e cos e)
+    // / 2.
+    double low = 0, high = M_PI;
+    for (int k = 0; k < 60; ++k) {
+      const double e = 0.5 * (low + high);
+      (radius * tilt * (std::sin(e) - e * std::cos(e)) / M_PI < overlap ? low : high) = e;
+    }
+    const double e = low;
+    const double arm = radius * (e - std::sin(e) * std::cos(e)) / (2 * (std::sin(e) - e * std::cos(e)));
+    best = std::max(best, std::atan2(arm, height) - tilt);
+  }
+  return best;
+}
+
 TEST(FlatStatics, tipping_at_the_angle_of_statics) {
-  const double degrees = 180 / M_PI;
   struct Case {
     ShapePointer shape;
     double heading, angle;
   };
-  std::vector<Case> cases = {{block(), 0, std::atan2(0.3, 0.6)},
-                             {block(), M_PI / 2, std::atan2(0.4, 0.6)},
-                             {can(), 0, std::atan2(0.3, 0.6)},
-                             {can(), M_PI / 8, std::atan2(0.3, 0.6)},  // between two corners of the octagon
-                             {can(), 0.1, std::atan2(0.3, 0.6)},
-                             {soap(), M_PI / 2, std::atan2(0.4, 0.4)}};
+  // A disc's rim yields: it tips a little early, the same way all round. Rigid in the limit.
+  const double degree = M_PI / 180, disc = ring_tipping_angle(0.3, 0.6, 1e-5);
+  EXPECT_NEAR(disc, std::atan2(0.3, 0.6), 0.8 * degree);
+  EXPECT_NEAR(ring_tipping_angle(0.3, 0.6, 1e-9), std::atan2(0.3, 0.6), 0.03 * degree);
+  const std::vector<Case> cases = {{block(), 0, std::atan2(0.3, 0.6)},
+                                   {block(), M_PI / 2, std::atan2(0.4, 0.6)},
+                                   {can(), 0, disc},
+                                   {can(), M_PI / 8, disc},
+                                   {can(), 0.1, disc},
+                                   {soap(), M_PI / 2, std::atan2(0.4, 0.4)}};
   for (const bool on_body : {false, true})
     for (const Case& c : cases) {
-      if (on_body && c.shape == soap()) continue;
       for (const double beyond : {-0.1, 0.1}) {
         World w;
         w.law = {1e5, 200, 8e4, 150, 2, 2e-5};  // stiff: a body leans by its points' overlap before it tips
@@ -341,11 +366,9 @@ TEST(FlatStatics, tipping_at_the_angle_of_statics) {
         w.movers[1].fixed = true;
         w.touches.emplace_back(on_body ? &w.movers[1] : nullptr, w.movers.data());
         w.forces();
-        const double leans = lean(w, w.movers[0], c.angle * degrees + beyond, c.heading);
-        if (beyond < 0)
-          EXPECT_LT(leans, 0.01) << c.shape->name << " " << c.heading << " on body " << on_body;
-        else
-          EXPECT_GT(leans, 0.2) << c.shape->name << " " << c.heading << " on body " << on_body;
+        const double leans = lean(w, w.movers[0], c.angle + beyond * degree, c.heading);
+        EXPECT_EQ(leans > 0.2, beyond > 0) << c.shape->name << " " << c.heading << " on body " << on_body;
+        EXPECT_TRUE(beyond > 0 || leans < 0.01) << leans;
       }
     }
 }
@@ -364,7 +387,6 @@ TEST(FlatStatics, sliding_without_chatter) {
   w.forces();
   const double a = std::sin(slope) - w.law.mu * std::cos(slope);
   w.run(2);  // the start decays
-  const double start = w.movers[0].v[0];
   double rocking = 0;
   while (w.movers[0].p.x[0] < 1.9) {  // from 1.5 on, ever more of it is beyond the border
     w.step();
@@ -372,7 +394,6 @@ TEST(FlatStatics, sliding_without_chatter) {
     rocking = std::max(rocking, std::hypot(spin[0], spin[1]));
     ASSERT_GT(w.movers[0].v[0], 0);
   }
-  (void)start;
   const double time = w.movers[0].v[0] / a;
   EXPECT_NEAR(w.movers[0].p.x[0], 0.5 * a * time * time, 0.02);
   EXPECT_LT(rocking, 2e-3);
