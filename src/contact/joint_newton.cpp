@@ -191,6 +191,17 @@ bool is_stationary(const PairFrame& pair, const PointPair& p) {
   return misfit2((p.na - p.nb).normalized(), p.b - p.a) <= allowed * allowed;
 }
 
+// Where the second-order update was refused, the normals are off by the angle itself: one more evaluation,
+// kept if it is nearer.
+__attribute__((noinline)) void draw_nearer(const PairFrame& pair, const Steps& steps, double tolerance,
+                                           double enough, JointSolution* s) {
+  JointSolution next = solve_joint(pair, advance(*pair.a, s->points.on_a, steps.a),
+                                   advance(*pair.b, s->points.on_b, steps.b), tolerance, enough, 1);
+  if (!next.converged || !(next.bracket.angle2 < s->bracket.angle2)) return;
+  next.iterations += s->iterations;
+  *s = next;
+}
+
 }  // namespace
 
 JointSolution solve_joint(const PairFrame& pair, const SurfacePoint& on_a, const SurfacePoint& on_b,
@@ -214,10 +225,13 @@ JointSolution solve_joint(const PairFrame& pair, const SurfacePoint& on_a, const
     const Forms a(out.jet_a, p.na), b(out.jet_b, p.na);
     const Steps steps = newton_step(p, out.jet_a, a, b);
     if (out.converged || out.stationary) {
-      if (!(steps.regular && !na.polar && !nb.polar && refine(pair, out, a, b, steps)))
-        out.normal = out.converged ? out.bracket.direction : Vec3((p.na - p.nb).normalized());
+      const bool refined = steps.regular && !na.polar && !nb.polar && refine(pair, out, a, b, steps);
+      if (!refined) out.normal = out.converged ? out.bracket.direction : Vec3((p.na - p.nb).normalized());
       out.gap = out.normal.dot(p.b - p.a);
       if (out.converged) out.gap = std::clamp(out.gap, out.bracket.lower, out.bracket.upper);
+      if (!refined && steps.regular && out.converged && cap > 1 && !(out.bracket.lower > enough) &&
+          out.bracket.angle2 * pair.size * pair.size > tolerance * tolerance)
+        draw_nearer(pair, steps, tolerance, enough, &out);
       return out;
     }
     if (!steps.regular || out.iterations >= cap) break;

@@ -13,6 +13,8 @@
 // quadratics over unit d is one 2 x 2 system; p at its solution d is wrong by what h is, and above its
 // minimum by what is left of the gradient:
 //     |error of the gap| <= (L_A t_A^3 + L_B t_B^3) / 6 + |grad p|^2 / (2 least eigenvalue of Hess p).
+// The normal, and with it the force, errs to first order in that gradient: by |grad p| / (least eigenvalue), in
+// which the maps' remainder (L_A t_A^2 + L_B t_B^2) / 2 is a bound, and a loose one (kRemainderShare).
 #pragma once
 
 #include "contact/pair_frame.h"
@@ -48,7 +50,7 @@ struct LocalContactOf {
   Triple<Real> point_a, point_b;  // from A's centre of mass, lab
   Real gap, error;                // |true gap - gap| <= error
   Real drift;                     // about how far the points may be from the true ones: L t^2 / 2
-  Real tilt2;        // square of the angle, rad, that the normal may be off by what one step left
+  Real tilt2;        // square of the angle, rad, that the normal may be off by: an estimate, see below
   Mask<Real> valid;  // false: outside what the model covers
 };
 using LocalContact = LocalContactOf<double>;
@@ -129,7 +131,7 @@ NURBS_INLINE LocalContactOf<Real> evaluate_local(const SupportModelOf<Real>& ma,
   const Real soft = (m11 + m22) * r;
   c.error = kRemainderSafety * (third * (1.0 / 6) + (left2 + own * own) * soft);
   c.drift = 0.5 * larger(second_a, second_b);
-  c.tilt2 = left2 * soft * soft;
+  c.tilt2 = (left2 + kRemainderShare * kRemainderShare * own * own) * soft * soft;
   c.valid = minimum & (stray2_a <= ma.room * ma.room) & (stray2_b <= mb.room * mb.room);
   return c;
 }

@@ -71,13 +71,24 @@ inline PointMemory fine(const CoarsePoint& c) {
   return {c.patch == 65535 ? -1.0 : c.patch, c.u / kSteps, c.v / kSteps, {0, 0}};
 }
 
-// Whether the local model's answer is good enough: its remainder below half the tolerance, on its patches,
-// and shallow enough to be the only contact.
+// Whether the local model's answer is good enough for the force, on its patches, and shallow enough to be the
+// only contact: the overlap's error below half the tolerance times the overlap, the normal's below it.
 template <class Real>
 NURBS_INLINE Mask<Real> serves(const LocalContactOf<Real>& c, const Real& unique, double tolerance,
                                const Real& size) {
   const Real allowed = tolerance * size;
-  return c.valid & (-c.gap <= unique) & (c.error <= 0.5 * allowed) & (c.drift <= kLocalDrift * allowed);
+  return c.valid & (-c.gap <= unique) & (c.error <= 0.5 * tolerance * larger(magnitude(c.gap), kForceDepth * size)) &
+         (c.tilt2 <= tolerance * tolerance) & (c.drift <= kLocalDrift * allowed);
+}
+
+// Whether a model made now is worth its 50 ns: bodies that turn as they did since the last solve, at the worst
+// once more than the last model served, would be served at least once. `gap`: of the contact, a length.
+inline bool may_serve(double rate_a, double rate_b, double turned2_a, double turned2_b, double gap,
+                      double tolerance, double size) {
+  const double a2 = 0.25 * turned2_a, b2 = 0.25 * turned2_b;
+  return kRemainderShare * 0.5 * (rate_a * a2 + rate_b * b2) <= tolerance * size &&
+         cubic_remainder(rate_a, a2) + cubic_remainder(rate_b, b2) <=
+             0.5 * tolerance * std::fmax(std::abs(gap), kForceDepth * size);
 }
 
 inline void set_local(const LocalContact& c, const Vec3& offset, double reach, ContactResult* r) {

@@ -86,7 +86,7 @@ class Ladder {
     if (!s.converged && !confirm(pair, tolerance, s)) return false;
     const double turned2_a = turned2(a_.q, memory_.proof.q_a), turned2_b = turned2(b_.q, memory_.proof.q_b);
     *r = finish(pair, s, s.normal, Rung::warm, s.iterations);
-    if (r->status == Status::converged) remember_model(pair, s, tolerance, turned2_a, turned2_b);
+    if (r->status == Status::converged) remember_model(pair, s, turned2_a, turned2_b);
     return true;
   }
 
@@ -207,13 +207,11 @@ class Ladder {
     remember_point(p.on_b, &memory_.on_b);
   }
 
-  // Worth its 50 ns only if bodies that turn as they just did would be served at least once.
-  void remember_model(const PairFrame& pair, const JointSolution& s, double tolerance, double turned2_a,
-                      double turned2_b) {
+  void remember_model(const PairFrame& pair, const JointSolution& s, double turned2_a, double turned2_b) {
     if (!(s.turn > 0)) return;
     const double rate_a = pair.scale_a * pair.a->curvature_rate[s.base_a.patch];
     const double rate_b = pair.scale_b * pair.b->curvature_rate[s.base_b.patch];
-    if (!(cubic_remainder(rate_a, turned2_a) + cubic_remainder(rate_b, turned2_b) <= 0.5 * tolerance)) return;
+    if (!may_serve(rate_a, rate_b, turned2_a, turned2_b, s.gap, settings_.tolerance, pair.size)) return;
     if (!make_support_model(Mat3::Identity(), Vec3::Zero(), s.base_a, s.jet_a, rate_a, &memory_.model.a))
       return;
     if (!make_support_model(pair.turn.transpose(), pair.offset, s.base_b, s.jet_b, rate_b, &memory_.model.b))

@@ -133,7 +133,7 @@ class PlaneLadder {
     r->rung = Rung::warm;
     const double turned2_before = turned2(particle_.q, memory_.proof.q_b);
     finish(s.support, r);
-    if (r->status == Status::converged) remember_model(s, turned2_before);
+    if (r->status == Status::converged) remember_model(s, turned2_before, r->gap);
     return true;
   }
 
@@ -172,11 +172,10 @@ class PlaneLadder {
     memory_.proof.contact = !(lower > settings_.reach);
   }
 
-  // Worth it only if a body that turns as it just did would be served at least once. A plane asks one support
-  // only: the model needs no uniqueness, but no dents near either.
-  void remember_model(const WarmSupport& s, double turned2_before) {
+  // A plane asks one support only: the model needs no uniqueness, but no dents near either.
+  void remember_model(const WarmSupport& s, double turned2_before, double gap) {
     const double rate = particle_.scale * shape_.curvature_rate[s.base.patch];
-    if (!(cubic_remainder(rate, turned2_before) <= 0.5 * tolerance_)) return;
+    if (!may_serve(0, rate, 0, turned2_before, gap, settings_.tolerance, radius_)) return;
     if (shape_.dented() && !(shape_.normal_map.radius_at(d_) < kFarAway)) return;
     JetLanes jet = s.jet;
     scale(particle_.scale, &jet);

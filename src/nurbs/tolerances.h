@@ -73,6 +73,10 @@ constexpr int kPolishIterations = 12;  // from a cold start
 constexpr int kRateSamples = 12;   // per patch parameter, of the inverse Weingarten map's rate of change
 constexpr double kRateSafety = 2;  // on the largest rate seen between samples
 constexpr double kRemainderSafety = 1.5;  // on the third-order remainder, for the fourth-order terms left out
+constexpr double kRemainderShare = 0.1;   // of the bound on the maps' remainder that normals err by: rates
+                                          // are the largest of a patch, doubled, and no turn meets them all
+constexpr double kForceDepth = 1e-3;      // of the smaller radius: overlaps are right to the tolerance times
+                                          // themselves, or times this if they are shallower
 constexpr double kLocalDrift = 20;        // of the tolerance that the contact points may be off
 constexpr double kRoomShare = 0.5;  // of the distance to the patch's edges that the contact point may move
 
