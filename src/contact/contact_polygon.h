@@ -14,30 +14,30 @@
 // allocates, throws or prints.
 //
 // Life of a contact, by the caller:
-//  1. Single point (ladder) with overlap delta > 0: try make_*_polygon with reach = max(kReach delta, a
-//  typical
-//     overlap). count = 0: stay with the single point. Asking at the first touch is best: U is then nothing.
-//  2. Hand-over: polygon.factor = continuity_factor(U before / kn, polygon, state) keeps U continuous. Later
-//     relax(polygon, state, dt / time) moves it to 1 and returns the work / kn that this puts into the
-//     springs
-//     (< 0: dissipated), to be booked. Factors above 1 (a corner that comes down flat: up to 4) relax at
-//     once; those below 1 would need work: let them be until the contact opens, or relax them while the
-//     damper dissipates more. A contact that opens (U = 0) starts again with 1.
+//  1. Single point (ladder) with overlap delta > 0: try make_*_polygon with reach = max(kReach delta, the
+//     overlap at rest). count = 0: stay with the single point. Asking at the first touch is best: U is then
+//     nothing.
+//  2. Hand-over: polygon.factor = continuity_factor(U before / kn, polygon, state) keeps U continuous. Then
+//     relax(polygon, state, dt / time) brings it to 1 over some periods of the contact and returns the work
+//     / kn that this puts into the springs, to be booked: < 0 for factors above 1 (a corner that comes down
+//     flat: up to 4); > 0 for those below, where an undamped contact should keep its factor until it opens.
+//     A contact that opens (U = 0) starts again with 1.
 //  3. Every step: evaluate, then judge.
-//       keep:   forces from the state.
-//       open:   no point overlaps. Back to the single point and to 1.
-//       moved:  the points slid over the reference outline by more than `room`, or they belong to a ruled
-//       line,
-//               which rolls: remake. Book the jump stored_energy(new) - stored_energy(old), or take it up in
-//               the factor. It is of second order: none under a uniform gap, whatever the weights.
-//       tilted: some points are open, or it stands on a crease, so the body may touch elsewhere: compare with
-//               support_gap (one support search) by outgrown(); only if that says so, remake. Where all
-//               points of a face are closed it can't be: beside a face the body falls away.
-//     A remake takes kKeptReach and hands over the old polygon. One that yields count = 0 hands back to the
-//     single point with factor continuity.
-//  4. match() tells from which old point every new one inherits its history (a spring xi_i is a displacement,
-//  the
-//     force w_i kt xi_i: copying it keeps the sum under a plain slide, whatever the weights).
+//     keep:   forces from the state.
+//     open:   no point overlaps. Back to the single point and to 1.
+//     moved:  the points slid over the reference outline by more than `room`, or they belong to a ruled line,
+//             which rolls: remake. Book the jump stored_energy(new) - stored_energy(old), or take it up in
+//             the factor. It is of second order: none under a uniform gap, whatever the weights.
+//     tilted: some points are open, or it stands on a crease, so the body may touch elsewhere: compare with
+//             support_gap (one support search) by outgrown(); only if that says so, remake. Where all points
+//             of a face are closed it can't be: beside a face the body falls away.
+//     A remake takes kKeptReach. One that yields count = 0 hands back to a single point, its factor likewise.
+//  4. match() tells from which old point every new one inherits its history. A spring xi_i is a displacement,
+//     its force w_i kt xi_i: copying it keeps the sum under a plain slide, whatever the weights.
+//
+// Limits. A disc's rim is as soft as its springs: it tips early by some (m g / kn / radius)^(2/5) rad, the
+// same way all round. Second moments of corner springs are up to three times those of a uniform bedding.
+// Round faces cut by a border, or that are the reference, are polygons of eight points.
 #pragma once
 
 #include <cstdint>
@@ -51,8 +51,7 @@ namespace nurbs {
 // --- tolerances
 constexpr double kReach = 3;  // overlaps by which points of one feature may lag behind the deepest when the
                               // contact is new (a box on the brink of tipping needs 1) ...
-constexpr double kKeptReach =
-    12;  // ... and when a polygon is remade: a leaning body stands on few of its points
+constexpr double kKeptReach = 12;     // ... and when a polygon is remade: a leaning body stands on few points
 constexpr double kSlideShare = 1e-3;  // of the polygon's size that cut points may slide before a remake: a
                                       // jump of the torque by 5e-4, of U by 1e-7
 constexpr double kReferenceShare = 0.05;  // of the overlap by which the other face must be the shallower one
@@ -71,10 +70,9 @@ struct ContactPolygon {
   double factor;         // see above; 1 unless set by the caller
   double room;           // lateral motion until it must be remade, length
   double mark[2][3];     // points 0 and `far` in the reference's axes when made, length
-  double point[kContactPoints][3];  // incident shape axes, scale 1
-  double weight[kContactPoints];    // sum 1
-  std::uint32_t
-      id[kContactPoints];  // which vertices or edges made it, the same for either reference; 0 unknown
+  double point[kContactPoints][3];   // incident shape axes, scale 1
+  double weight[kContactPoints];     // sum 1
+  std::uint32_t id[kContactPoints];  // vertices or sides that made it, for either reference; 0 unknown
 };
 static_assert(std::is_trivially_copyable_v<ContactPolygon> && sizeof(ContactPolygon) == 408);
 
