@@ -55,6 +55,7 @@ static_assert(sizeof(ContactBlock) <= kBlock * 640, "a contact's memory");
 // the points of the polygon. It hangs on the pair's contact, whose own state of the law is then empty.
 struct FlatContact {
   ContactPolygon polygon;
+  double beyond;  // energy over kn that round faces hold beside the points' own
   ContactBlock points;
 };
 struct FlatRecord {  // as it travels

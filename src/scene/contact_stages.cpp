@@ -601,6 +601,10 @@ ContactView ContactStages::view(const ContactBlock& block, int lane) const {
 EnergyLedger ContactStages::stored() const {
   EnergyLedger sum;
   for_each_contact([&](const ContactView& c) { sum.add(stored_energy(c.law, c.state), c.share); });
+  for (const FlatContact& flat : pool_.flats())
+    if (flat.points.used != 0)
+      sum.normal_spring +=
+          share(flat.points.a[0], flat.points.b[0]) * step_.laws[flat.points.law[0]].kn * flat.beyond;
   return sum;
 }
 

@@ -8,13 +8,19 @@
 namespace nurbs {
 namespace {
 
-// Of its distance to 1 that a factor above it moves in a step: a corner that has come down flat is up to four
-// times too stiff, and the spring energy that it gives up is booked.
+// Of its distance to 1 that a factor moves in a step: a corner that has come down flat is up to four times
+// too stiff. The spring energy that it gives up, or takes from the dampers' share, is booked; undamped
+// contacts only give.
 constexpr double kRelaxation = 2e-3;
 
-BodyFrame frame_of(const BodyRecord& r, double scale) {
+bool relaxes(const ContactCoefficients& law, double factor) {
+  return factor > 1 || (factor < 1 && law.cn > 0);
+}
+
+BodyFrame frame_of(const BodyRecord& r, double scale, const Shape* shape) {
   BodyFrame f;
   f.scale = scale;
+  f.shape = shape;
   f.x = load(r.x);
   f.axes = Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(r.turn);
   return f;
@@ -63,8 +69,10 @@ void ContactStages::book(double energy, int a, int b) {
 static PolygonState now(const ContactPolygon& polygon, const Bodies& bodies, const BodyRecord* wall, int a,
                         int b) {
   const BodyArrays& arrays = bodies.arrays();
-  return evaluate(polygon, a < 0 ? plane_frame(load(wall->x)) : frame_of(bodies.record(a), arrays.scale[a]),
-                  frame_of(bodies.record(b), arrays.scale[b]));
+  const auto frame = [&](int i) {
+    return frame_of(bodies.record(i), arrays.scale[i], arrays.shapes[arrays.shape[i]]);
+  };
+  return evaluate(polygon, a < 0 ? plane_frame(load(wall->x)) : frame(a), frame(b));
 }
 
 // Tries to turn a touching contact into several. The springs keep their energy across the normal; what they
@@ -74,10 +82,10 @@ bool ContactStages::make_flat(ContactBlock& block, int lane, const Results& sing
   const double overlap = -single.gap[lane];
   ContactPolygon polygon;
   const Particle body = step_.bodies->particle(b);
-  const bool made = a < 0 ? make_plane_polygon(body, load(step_.wall->x), step_.wall_normal, overlap,
-                                               kReach * overlap, &polygon)
-                          : make_pair_polygon(step_.bodies->particle(a), body, single.normal_of(lane),
-                                              overlap, kReach * overlap, nullptr, &polygon);
+  const bool made =
+      a < 0 ? make_plane_polygon(body, load(step_.wall->x), step_.wall_normal, kReach * overlap, &polygon)
+            : make_pair_polygon(step_.bodies->particle(a), body, single.normal_of(lane), overlap,
+                                kReach * overlap, nullptr, &polygon);
   if (!made || polygon.count < 2) return false;
   const PolygonState state = now(polygon, *step_.bodies, step_.wall, a, b);
   const double weight = block.field[kWeight][lane];
@@ -138,7 +146,8 @@ bool ContactStages::serve_flat(ContactBlock& block, int lane) {
       return false;
     }
   }
-  if (!step_.setup && flat.polygon.factor > 1) relax_factor(block, lane, flat, state);
+  if (!step_.setup && relaxes(step_.laws[block.law[lane]], flat.polygon.factor))
+    relax_factor(block, lane, flat, state);
   counts_.value[ContactCounts::local_model] += share(a, b);
   run_flat(block, lane, flat, state);
   return true;
@@ -165,11 +174,10 @@ bool ContactStages::remake(ContactBlock& block, int lane, FlatContact& flat, Pol
   const int a = block.a[lane], b = block.b[lane];
   const Particle body = step_.bodies->particle(b);
   ContactPolygon polygon;
-  const double reach = kReach * overlap;
-  const bool made =
-      a < 0 ? make_plane_polygon(body, load(step_.wall->x), step_.wall_normal, overlap, reach, &polygon)
-            : make_pair_polygon(step_.bodies->particle(a), body, state.normal, overlap, reach, &flat.polygon,
-                                &polygon);
+  const double reach = kKeptReach * overlap;
+  const bool made = a < 0 ? make_plane_polygon(body, load(step_.wall->x), step_.wall_normal, reach, &polygon)
+                          : make_pair_polygon(step_.bodies->particle(a), body, state.normal, overlap, reach,
+                                              &flat.polygon, &polygon);
   if (!made || polygon.count < 2) return false;
   polygon.factor = flat.polygon.factor;
   const PolygonState fresh = now(polygon, *step_.bodies, step_.wall, a, b);
@@ -211,12 +219,14 @@ void ContactStages::run_flat(ContactBlock& block, int lane, FlatContact& flat, c
   const int a = block.a[lane], b = block.b[lane];
   Results results;
   fill(flat.polygon, state, offset(a, b), &flat.points, &results);
+  flat.beyond = stored_energy(flat.polygon, state);
   for (int k = 0; k < state.count; ++k) {
     if (step_.setup)
       start_run(flat.points, k, results);
     else if (results.touching[k] == 0)
       close(flat.points, k);
     counts_.value[ContactCounts::contacts] += share(a, b) * results.touching[k];
+    flat.beyond -= 0.5 * flat.points.field[kWeight][k] * results.touching[k] * state.gap[k] * state.gap[k];
   }
   if (!step_.setup) apply_law(flat.points, results);
 }
@@ -270,7 +280,7 @@ void ContactStages::relax_weight(ContactBlock& block, int lane, double gap) {
     weight = 1;
     return;
   }
-  if (weight < 1) return;
+  if (!relaxes(step_.laws[block.law[lane]], weight)) return;
   const double change = kRelaxation * (1 - weight);
   ContactState state;
   block.get(lane, kStateField, kContactStateSize, &state);
