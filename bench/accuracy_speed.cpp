@@ -14,7 +14,7 @@
 #include "bench/competitors.h"
 #include "bench/machine.h"
 #include "bench/reference.h"
-#include "tests/core/ellipsoid_oracle.h"
+#include "support/ellipsoid_oracle.h"
 
 namespace nurbs::bench {
 namespace {
@@ -35,7 +35,8 @@ Scene make_scene(const Body& body) {
   Scene scene{&body, {}, {}};
   for (int k = 0; k < kPaths; ++k) {
     const double overlap = std::pow(10.0, random.uniform(-4, -2));
-    scene.paths.push_back(tumble(random, random_pair(random, *body.shape, -overlap), kTurn, kSteps));
+    scene.paths.push_back(
+        test::tumble(random, test::random_pair_at(random, *body.shape, -overlap), kTurn, kSteps));
     std::vector<Reference> references;
     for (const Pair& pair : scene.paths.back()) references.push_back(make_reference(pair));
     scene.references.push_back(references);

@@ -42,7 +42,8 @@ const Scene& scene(int which) {
   Scene s{&body, {}, {}, {}};
   for (int k = 0; k < kPaths; ++k) {
     const double overlap = std::pow(10.0, random.uniform(-4, -2));
-    s.paths.push_back(tumble(random, random_pair(random, *body.shape, -overlap), kTurn, kSteps));
+    s.paths.push_back(
+        test::tumble(random, test::random_pair_at(random, *body.shape, -overlap), kTurn, kSteps));
   }
   for (int k = 0; k < 256; ++k) {
     s.directions.push_back(random.direction());
@@ -355,7 +356,7 @@ Row cold_tail(const Body& body, int pairs, double* p99, double* worst, int* unre
   *unresolved = 0;
   const double cost = clock_cost();
   for (int k = 0; k < pairs; ++k) {
-    const Pair pair = random_pair(random, *body.shape, -random.uniform(1e-4, 1e-2));
+    const Pair pair = test::random_pair_at(random, *body.shape, -random.uniform(1e-4, 1e-2));
     double best = 1;
     for (int repeat = 0; repeat < 3; ++repeat) {
       double memory[kPairMemorySize] = {};

@@ -14,8 +14,8 @@
 #include <vector>
 
 #include "bench/competitors.h"
-#include "bench/families.h"
 #include "bench/machine.h"
+#include "support/families.h"
 
 namespace nurbs {
 namespace {

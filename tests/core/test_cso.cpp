@@ -3,10 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <cstdlib>
 #include <limits>
-#include <new>
-#include <random>
 
 #include "body/shape.h"
 #include "body/support.h"
@@ -14,42 +11,24 @@
 #include "reference/cso_derivatives.h"
 #include "reference/trust_region.h"
 #include "shapes/primitives.h"
-
-namespace {
-std::size_t allocations = 0;
-}
-// Not inlined: the compiler would take the pair malloc, operator delete for a mistake.
-[[gnu::noinline]] void* operator new(std::size_t size) {
-  ++allocations;
-  if (void* p = std::malloc(size ? size : 1)) return p;
-  throw std::bad_alloc();
-}
-[[gnu::noinline]] void operator delete(void* p) noexcept {
-  std::free(p);
-}
-[[gnu::noinline]] void operator delete(void* p, std::size_t) noexcept {
-  std::free(p);
-}
+#include "support/allocations.h"
+#include "support/random.h"
 
 namespace nurbs {
 namespace {
 
-std::mt19937_64& random_engine() {
-  static std::mt19937_64 engine(20240607);
-  return engine;
+test::Random& random_numbers() {
+  static test::Random random(20240607);
+  return random;
 }
 double uniform(double low, double high) {
-  return std::uniform_real_distribution<double>(low, high)(random_engine());
+  return random_numbers().uniform(low, high);
 }
 Vec3 random_direction() {
-  std::normal_distribution<double> normal;
-  return Vec3(normal(random_engine()), normal(random_engine()), normal(random_engine())).normalized();
+  return random_numbers().direction();
 }
 Quat random_turn() {
-  std::normal_distribution<double> normal;
-  return Quat(normal(random_engine()), normal(random_engine()), normal(random_engine()),
-              normal(random_engine()))
-      .normalized();
+  return random_numbers().turn();
 }
 
 const Shape& pebble_shape() {
@@ -422,9 +401,9 @@ TEST(Cso, ResultDoesNotDependOnUnitsOrPlace) {
 TEST(Cso, AllocatesNothing) {
   const Particle a = particle(pebble_shape(), 1, Vec3::Zero(), random_turn());
   const Particle b = particle(ellipsoid_shape(), 1, Vec3(1.3, 0.4, 0.2), random_turn());
-  const std::size_t before = allocations;
+  const long before = test::allocations();
   const ContactResult r = solve_cso(a, b, 1e-9);
-  EXPECT_EQ(allocations, before);
+  EXPECT_EQ(test::allocations(), before);
   EXPECT_EQ(r.status, Status::converged);
 }
 

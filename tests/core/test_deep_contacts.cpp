@@ -6,8 +6,9 @@
 #include <cmath>
 #include <vector>
 
-#include "bodies.h"
 #include "contact/pair_search.h"
+#include "support/bodies.h"
+#include "support/pairs.h"
 
 namespace nurbs {
 namespace {

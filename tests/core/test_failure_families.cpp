@@ -8,9 +8,9 @@
 #include <string>
 #include <utility>
 
-#include "../../bench/families.h"
 #include "body/support.h"
 #include "contact/contact.h"
+#include "support/families.h"
 
 namespace nurbs::families {
 namespace {

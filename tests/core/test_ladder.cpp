@@ -3,29 +3,12 @@
 #include <gtest/gtest.h>
 
 #include <array>
-#include <atomic>
-#include <cstdlib>
 #include <map>
-#include <new>
 
-#include "bodies.h"
 #include "contact/pair_search.h"
-
-namespace {
-std::atomic<long> allocations{0};
-}
-
-void* operator new(size_t size) {
-  ++allocations;
-  if (void* p = std::malloc(size)) return p;
-  throw std::bad_alloc();
-}
-void operator delete(void* p) noexcept {
-  std::free(p);
-}
-void operator delete(void* p, size_t) noexcept {
-  std::free(p);
-}
+#include "support/allocations.h"
+#include "support/bodies.h"
+#include "support/pairs.h"
 
 namespace nurbs {
 namespace {
@@ -151,7 +134,7 @@ TEST(Ladder, allocates_nothing) {
   settings.reach = 0;
   Memory warm{};
   find_contact(pairs[0].a, pairs[0].b, settings, warm.data());  // tables made once
-  const long before = allocations;
+  const long before = allocations();
   for (const Pair& pair : pairs)
     for (int repeat = 0; repeat < 3; ++repeat) {
       Memory memory{};
@@ -159,7 +142,7 @@ TEST(Ladder, allocates_nothing) {
       find_contact(pair.a, pair.b, settings, memory.data());
       find_plane_contact(pair.a, Vec3::Zero(), Vec3::UnitZ(), settings, memory.data());
     }
-  EXPECT_EQ(allocations, before);
+  EXPECT_EQ(allocations(), before);
 }
 
 TEST(Ladder, numbers_that_are_none_are_reported_not_spread) {

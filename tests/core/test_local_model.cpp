@@ -1,10 +1,9 @@
 // The certified local model against closed forms and against solves from scratch, while the contact rolls.
 #include <gtest/gtest.h>
 
-#include <random>
-
 #include "contact/pair_search.h"
 #include "shapes/primitives.h"
+#include "support/random.h"
 
 namespace nurbs {
 namespace {
@@ -62,9 +61,7 @@ TEST(LocalModel, SphereOnPlaneIsExact) {
 // Bodies that turn and slide a little at a time: the model's bracket holds the answer of a solve from
 // scratch.
 TEST(LocalModel, BracketHoldsTheTrueGap) {
-  std::mt19937_64 engine(5);
-  std::normal_distribution<double> normal;
-  const auto vector = [&] { return Vec3(normal(engine), normal(engine), normal(engine)); };
+  test::Random random(5);
   const auto first = make_shape("first", exact_ellipsoid(Vec3(1, 0.9, 0.7)));
   const auto second = make_shape("second", exact_ellipsoid(Vec3(0.8, 0.8, 0.6)));
   int served = 0;
@@ -74,13 +71,13 @@ TEST(LocalModel, BracketHoldsTheTrueGap) {
       Particle a, b;
       a.shape = first.get();
       b.shape = second.get();
-      a.q = turned_by(vector(), a.q);
-      b.q = turned_by(vector(), b.q);
-      const Vec3 line = vector().normalized();
+      a.q = turned_by(random.vector(), a.q);
+      b.q = turned_by(random.vector(), b.q);
+      const Vec3 line = random.vector().normalized();
       double fresh_memory[kPairMemorySize] = {};
       b.x = 2 * line;
       b.x = (2 - find_contact(a, b, settings(1e-13), fresh_memory).gap - 0.01) * line;
-      const Vec3 spin_a = 1e-3 * vector(), spin_b = 1e-3 * vector();
+      const Vec3 spin_a = 1e-3 * random.vector(), spin_b = 1e-3 * random.vector();
       for (int i = 0; i < 60; ++i) {
         a.q = turned_by(spin_a, a.q);
         b.q = turned_by(spin_b, b.q);

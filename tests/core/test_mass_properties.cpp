@@ -3,24 +3,15 @@
 
 #include <algorithm>
 #include <cmath>
-#include <random>
 
 #include "body/mass_properties.h"
 #include "shapes/primitives.h"
+#include "support/random.h"
 
 namespace nurbs {
 namespace {
 
-using Random = std::mt19937_64;
-
-double uniform(Random& random, double lo, double hi) {
-  return std::uniform_real_distribution<double>(lo, hi)(random);
-}
-
-Quat random_rotation(Random& random) {
-  std::normal_distribution<double> normal;
-  return Quat(normal(random), normal(random), normal(random), normal(random)).normalized();
-}
+using test::Random;
 
 std::vector<BezierPatch> split_all(const std::vector<NurbsSurface>& surfaces) {
   std::vector<BezierPatch> patches;
@@ -59,9 +50,9 @@ Expected cuboid(const Vec3& half) {
 void expect_mass(const std::vector<NurbsSurface>& body, const Expected& expected, Random& random,
                  double tolerance) {
   std::vector<BezierPatch> patches = split_all(body);
-  const Mat3 r = random_rotation(random).toRotationMatrix();
+  const Mat3 r = random.turn().toRotationMatrix();
   const double size = std::cbrt(expected.volume);
-  const Vec3 offset = size * Vec3(uniform(random, -3, 3), uniform(random, -3, 3), uniform(random, -3, 3));
+  const Vec3 offset = size * random.box(-3, 3);
   move(patches, r, offset);
   const MassProperties mass = integrate_mass(patches);
   const Mat3 inertia = r * inertia_of(expected.second.asDiagonal()) * r.transpose();
@@ -73,7 +64,7 @@ void expect_mass(const std::vector<NurbsSurface>& body, const Expected& expected
 TEST(MassProperties, ExactEllipsoids) {
   Random random(1);
   for (int trial = 0; trial < 20; ++trial) {
-    const Vec3 a(uniform(random, 0.3, 3), uniform(random, 0.3, 3), uniform(random, 0.3, 3));
+    const Vec3 a = random.box(0.3, 3);
     expect_mass(exact_ellipsoid(a), ellipsoid(a), random, 1e-10);
   }
 }
@@ -81,7 +72,7 @@ TEST(MassProperties, ExactEllipsoids) {
 TEST(MassProperties, OnePatchEllipsoidsWithPolesAndSeam) {
   Random random(2);
   for (int trial = 0; trial < 20; ++trial) {
-    const double a = uniform(random, 0.3, 3), c = uniform(random, 0.3, 3);
+    const double a = random.uniform(0.3, 3), c = random.uniform(0.3, 3);
     expect_mass(revolved_ellipsoid(a, c), ellipsoid({a, a, c}), random, 1e-10);
   }
 }
@@ -104,7 +95,7 @@ TEST(MassProperties, SmallAndLargeUnits) {
 TEST(MassProperties, BoxIsIntegratedToRoundOff) {
   Random random(5);
   for (int trial = 0; trial < 20; ++trial) {
-    const Vec3 half(uniform(random, 0.3, 3), uniform(random, 0.3, 3), uniform(random, 0.3, 3));
+    const Vec3 half = random.box(0.3, 3);
     expect_mass(box(half), cuboid(half), random, 2e-13);
   }
 }
@@ -119,9 +110,9 @@ TEST(MassProperties, InwardPatchesGiveNegativeVolume) {
 TEST(PrincipalFrame, DiagonalisesARotatedTensor) {
   Random random(6);
   for (int trial = 0; trial < 100; ++trial) {
-    Vec3 moments(uniform(random, 1, 2), uniform(random, 1, 2), uniform(random, 1, 2));
+    Vec3 moments = random.box(1, 2);
     std::sort(moments.data(), moments.data() + 3);
-    const Mat3 r = random_rotation(random).toRotationMatrix();
+    const Mat3 r = random.turn().toRotationMatrix();
     const Mat3 tensor = r * moments.asDiagonal() * r.transpose();
     const PrincipalFrame frame = principal_frame(tensor);
     EXPECT_LT((frame.moments - moments).norm(), 1e-14);

@@ -1,8 +1,9 @@
 // The normal map's promise, against searches of the whole surface.
 #include <gtest/gtest.h>
 
-#include "bodies.h"
 #include "nurbs/tolerances.h"
+#include "support/bodies.h"
+#include "support/random.h"
 
 namespace nurbs {
 namespace {

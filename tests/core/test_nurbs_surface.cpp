@@ -3,39 +3,31 @@
 
 #include <algorithm>
 #include <limits>
-#include <random>
 
 #include "nurbs/nurbs_surface.h"
+#include "support/random.h"
 
 namespace nurbs {
 namespace {
 
-using Random = std::mt19937_64;
-
-double uniform(Random& random, double lo, double hi) {
-  return std::uniform_real_distribution<double>(lo, hi)(random);
-}
-
-int whole(Random& random, int lo, int hi) {
-  return std::uniform_int_distribution<int>(lo, hi)(random);
-}
+using test::Random;
 
 // Knots on [0, 3] and outside: clamped or not, interior knots of multiplicity 1 .. degree. `size` receives
 // the number of control points that belong to them.
 std::vector<double> random_knots(Random& random, int degree, bool clamped, int& size) {
   std::vector<double> knots;
   double t = 0;
-  for (int i = 0; i <= degree; ++i) knots.push_back(clamped ? 0 : -uniform(random, 0, 1));
+  for (int i = 0; i <= degree; ++i) knots.push_back(clamped ? 0 : -random.uniform(0, 1));
   std::sort(knots.begin(), knots.end());
   knots.back() = 0;
-  const int interior = whole(random, 0, 4);
+  const int interior = random.whole(0, 4);
   for (int i = 0; i < interior; ++i) {
-    t += uniform(random, 0.05, 0.6);
-    const int multiplicity = whole(random, 1, degree);
+    t += random.uniform(0.05, 0.6);
+    const int multiplicity = random.whole(1, degree);
     knots.insert(knots.end(), multiplicity, t);
   }
   std::vector<double> tail;
-  for (int i = 0; i <= degree; ++i) tail.push_back(clamped ? 3 : 3 + uniform(random, 0, 1));
+  for (int i = 0; i <= degree; ++i) tail.push_back(clamped ? 3 : 3 + random.uniform(0, 1));
   std::sort(tail.begin(), tail.end());
   tail.front() = 3;
   knots.insert(knots.end(), tail.begin(), tail.end());
@@ -50,8 +42,8 @@ NurbsSurface random_surface(Random& random, int degree_u, int degree_v, bool cla
   s.knots_u = random_knots(random, degree_u, clamped, s.size_u);
   s.knots_v = random_knots(random, degree_v, clamped, s.size_v);
   for (int i = 0; i < s.size_u * s.size_v; ++i) {
-    const double w = rational ? uniform(random, 0.3, 3) : 1;
-    s.points.push_back(w * Vec4(uniform(random, -1, 1), uniform(random, -1, 1), uniform(random, -1, 1), 1));
+    const double w = rational ? random.uniform(0.3, 3) : 1;
+    s.points.push_back(w * Vec4(random.uniform(-1, 1), random.uniform(-1, 1), random.uniform(-1, 1), 1));
   }
   return s;
 }
@@ -79,8 +71,8 @@ TEST(NurbsSurface, DeBoorAgreesWithTheDefinitionOfTheBasis) {
   Random random(1);
   for (int trial = 0; trial < 100; ++trial) {
     const NurbsSurface s =
-        random_surface(random, whole(random, 1, 5), whole(random, 1, 5), trial % 2, trial % 3);
-    const double u = uniform(random, 0, 3), v = uniform(random, 0, 3);
+        random_surface(random, random.whole(1, 5), random.whole(1, 5), trial % 2, trial % 3);
+    const double u = random.uniform(0, 3), v = random.uniform(0, 3);
     EXPECT_LT((evaluate(s, u, v) - evaluate_by_definition(s, u, v)).norm(), 1e-13) << "trial " << trial;
   }
 }
@@ -93,7 +85,7 @@ TEST(NurbsSurface, BezierSplitAgreesWithDeBoorForEveryDegree) {
         const NurbsSurface s = random_surface(random, degree_u, degree_v, kind % 2, kind / 2);
         for (const BezierPiece& piece : split_to_bezier(s)) {
           for (int k = 0; k < 4; ++k) {
-            const double a = uniform(random, 0, 1), b = uniform(random, 0, 1);
+            const double a = random.uniform(0, 1), b = random.uniform(0, 1);
             const Vec3 expected =
                 evaluate(s, piece.u0 + a * (piece.u1 - piece.u0), piece.v0 + b * (piece.v1 - piece.v0));
             EXPECT_LT((evaluate0(piece.patch, a, b) - expected).norm(), 1e-13)
@@ -159,7 +151,7 @@ TEST(NurbsSurface, SwapExchangesTheParameters) {
   Random random(7);
   const NurbsSurface s = random_surface(random, 2, 5, false, true), t = swap_uv(s);
   for (int k = 0; k < 20; ++k) {
-    const double u = uniform(random, 0, 3), v = uniform(random, 0, 3);
+    const double u = random.uniform(0, 3), v = random.uniform(0, 3);
     EXPECT_LT((evaluate(s, u, v) - evaluate(t, v, u)).norm(), 1e-14);
   }
   EXPECT_EQ(swap_uv(t).points, s.points);

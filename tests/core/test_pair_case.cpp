@@ -5,9 +5,10 @@
 #include <cstring>
 #include <fstream>
 
-#include "bodies.h"
 #include "contact/pair_search.h"
 #include "io/pair_case.h"
+#include "support/bodies.h"
+#include "support/pairs.h"
 
 namespace nurbs {
 namespace {

@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
-#include <random>
 
 #include "body/local_form.h"
 #include "body/shape.h"
@@ -12,21 +11,13 @@
 #include "io/shape_file.h"
 #include "nurbs/affine.h"
 #include "shapes/primitives.h"
+#include "support/random.h"
 
 namespace nurbs {
 namespace {
 
 using Surfaces = std::vector<NurbsSurface>;
-using Random = std::mt19937_64;
-
-double uniform(Random& random, double lo, double hi) {
-  return std::uniform_real_distribution<double>(lo, hi)(random);
-}
-
-Vec3 random_direction(Random& random) {
-  std::normal_distribution<double> normal;
-  return Vec3(normal(random), normal(random), normal(random)).normalized();
-}
+using test::Random;
 
 // Calls visit(patch, u, v) on a grid of every Bezier piece, edges included, that lines up with no fit sample.
 void for_each_point(const Surfaces& body,
@@ -243,7 +234,7 @@ TEST(Pebble, isConvexSmoothAndWithoutSymmetry) {
     const Vec3 sign(mirror & 1 ? -1 : 1, mirror & 2 ? -1 : 1, mirror & 4 ? -1 : 1);
     double most = 0;
     for (int k = 0; k < 100; ++k) {
-      const Vec3 d = random_direction(random);
+      const Vec3 d = random.direction();
       most = std::max(most, std::abs(h(axes * d) - h(axes * sign.cwiseProduct(d))));
     }
     EXPECT_GT(most, 0.01) << mirror;
@@ -294,9 +285,8 @@ TEST(Inertia, ofRandomTensorsIsMetToRoundOffFromAnyBody) {
   Random random(7);
   const Surfaces stone = pebble(), cuboid = box(Vec3(1, 2, 3));
   for (int k = 0; k < 20; ++k) {
-    const Vec3 axes(uniform(random, 0.2, 1), uniform(random, 0.2, 1), uniform(random, 0.2, 1));
-    const Mat3 q =
-        Quat(Eigen::AngleAxisd(uniform(random, 0, 3), random_direction(random))).toRotationMatrix();
+    const Vec3 axes = random.box(0.2, 1);
+    const Mat3 q = Quat(Eigen::AngleAxisd(random.uniform(0, 3), random.direction())).toRotationMatrix();
     const Vec3 square = axes.cwiseAbs2();
     const Mat3 gyration =
         1e-3 * q * Mat3((square.sum() * Vec3::Ones() - square).asDiagonal()) * q.transpose();

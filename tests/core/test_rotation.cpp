@@ -6,43 +6,27 @@
 #include <cmath>
 #include <cstdio>
 #include <limits>
-#include <random>
 #include <vector>
 
 #include "motion/free_rotor.h"
 #include "motion/rotation.h"
+#include "support/random.h"
 
 namespace nurbs {
 namespace {
+
+using test::Random;
 
 constexpr RotationScheme kSchemes[] = {RotationScheme::symplectic, RotationScheme::richardson,
                                        RotationScheme::exact};
 const Vec3 kTop(1, 2, 3);
 const double kEps = std::numeric_limits<double>::epsilon();
 
-class Random {
- public:
-  explicit Random(unsigned seed) : engine_(seed) {}
-  double uniform(double low, double high) {
-    return std::uniform_real_distribution<double>(low, high)(engine_);
-  }
-  Vec3 vector() {
-    std::normal_distribution<double> normal;
-    return {normal(engine_), normal(engine_), normal(engine_)};
-  }
-  Quat rotation() {
-    std::normal_distribution<double> normal;
-    return Quat(normal(engine_), normal(engine_), normal(engine_), normal(engine_)).normalized();
-  }
-  // Principal moments a solid can have: each below the sum of the other two.
-  Vec3 inertia() {
-    const Vec3 m(uniform(0.05, 2), uniform(0.05, 2), uniform(0.05, 2));
-    return {m[1] + m[2], m[2] + m[0], m[0] + m[1]};
-  }
-
- private:
-  std::mt19937_64 engine_;
-};
+// Principal moments a solid can have: each below the sum of the other two.
+Vec3 random_inertia(Random& random) {
+  const Vec3 m = random.box(0.05, 2);
+  return {m[1] + m[2], m[2] + m[0], m[0] + m[1]};
+}
 
 // Angle between two orientations; first order in the error, so good to round-off.
 double angle_between(const Quat& a, const Quat& b) {
@@ -154,9 +138,9 @@ TEST(Elliptic, CompletePiIsTheQuadrature) {
 TEST(FreeRotor, AgreesWithIndependentIntegration) {
   Random random(2);
   for (int i = 0; i < 60; ++i) {
-    const Vec3 inertia = random.inertia();
+    const Vec3 inertia = random_inertia(random);
     const Vec3 l = random.vector();
-    const Quat q0 = random.rotation();
+    const Quat q0 = random.turn();
     const double turn = l.norm() / inertia.minCoeff();  // fastest rate
     const double time = (i % 2 ? 1 : -1) * 20 / turn;
     const Quat reference = integrate_reference(inertia, l, q0, time, 100);
@@ -230,9 +214,8 @@ TEST(Schemes, AreExactForSpheres) {
   for (RotationScheme scheme : kSchemes)
     for (int i = 0; i < 20; ++i) {
       const double moment = random.uniform(0.1, 2);
-      const Vec3 axis = random.vector().normalized();
-      expect_steady(scheme, Vec3::Constant(moment), random.rotation(), random.rotation(), axis, moment, 50,
-                    1e-12);
+      const Vec3 axis = random.direction();
+      expect_steady(scheme, Vec3::Constant(moment), random.turn(), random.turn(), axis, moment, 50, 1e-12);
     }
 }
 
@@ -242,7 +225,7 @@ TEST(Schemes, AreExactAboutPrincipalAxes) {
   for (RotationScheme scheme : kSchemes)
     for (const Vec3& inertia : orders)
       for (int k = 0; k < 3; ++k) {
-        const Quat axes = random.rotation(), q0 = random.rotation();
+        const Quat axes = random.turn(), q0 = random.turn();
         // About the intermediate axis round-off grows exponentially: fewer radians.
         const double radians = inertia[k] == 2 ? 5 : 50;
         expect_steady(scheme, inertia, axes, q0, q0 * (axes * Vec3::Unit(k).eval()), inertia[k], radians,
@@ -264,7 +247,7 @@ TEST(Schemes, SymplecticAndExactAreExactForSymmetricTops) {
       for (int axis = 0; axis < 3; ++axis) {
         Vec3 inertia = Vec3::Constant(0.7);
         inertia[axis] = 0.7 * ratio;
-        const Quat q0 = random.rotation();
+        const Quat q0 = random.turn();
         const Vec3 l = random.vector();
         const Quat expected = symmetric_top(0.7, 0.7 * ratio, axis, l, q0, 20);
         EXPECT_LT(angle_between(advance(scheme, inertia, l, q0, 20, 100), expected), 2e-13)
@@ -278,7 +261,7 @@ TEST(Schemes, NearlySymmetricTopsFollowTheIndependentIntegration) {
     for (int odd = 0; odd < 3; ++odd) {
       Vec3 inertia(1, 1 + split, 1 - 0.3 * split);
       inertia[odd] *= 1.5;
-      const Quat q0 = random.rotation();
+      const Quat q0 = random.turn();
       const Vec3 l = random.vector();
       const Quat reference = integrate_reference(inertia, l, q0, 15, 60);
       EXPECT_LT(angle_between(advance(RotationScheme::exact, inertia, l, q0, 15, 10), reference), 1e-12)
@@ -339,8 +322,8 @@ TEST(FreeRotor, SeparatrixIsTheHyperbolicSolution) {
 TEST(Schemes, AreTimeReversible) {
   Random random(6);
   for (int i = 0; i < 50; ++i) {
-    const Vec3 inertia = random.inertia(), l = random.vector();
-    const Quat axes = random.rotation(), q0 = random.rotation();
+    const Vec3 inertia = random_inertia(random), l = random.vector();
+    const Quat axes = random.turn(), q0 = random.turn();
     for (RotationScheme scheme : {RotationScheme::symplectic, RotationScheme::exact}) {
       const double time = 5 * inertia.minCoeff() / l.norm();
       Quat q = advance(scheme, inertia, l, q0, time, 100, axes);
@@ -374,8 +357,8 @@ TEST(Schemes, EnergyIsConserved) {
 TEST(Schemes, MomentumVelocityAndFramesAgree) {
   Random random(7);
   for (int i = 0; i < 50; ++i) {
-    const Vec3 inertia = random.inertia(), l = random.vector();
-    const Quat axes = random.rotation(), q = random.rotation();
+    const Vec3 inertia = random_inertia(random), l = random.vector();
+    const Quat axes = random.turn(), q = random.turn();
     const Mat3 turn = (q * axes).toRotationMatrix();
     const Mat3 tensor = turn * inertia.asDiagonal() * turn.transpose();
     const Vec3 omega = angular_velocity(l, q, axes, inertia);

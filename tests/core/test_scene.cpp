@@ -3,9 +3,10 @@
 
 #include <map>
 
-#include "bodies.h"
 #include "contact/pair_search.h"
 #include "scene/contact_stages.h"
+#include "support/bodies.h"
+#include "support/random.h"
 
 namespace nurbs {
 namespace {

@@ -4,26 +4,17 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <random>
 
 #include "body/connectivity.h"
 #include "body/shape.h"
 #include "shapes/primitives.h"
+#include "support/random.h"
 
 namespace nurbs {
 namespace {
 
-using Random = std::mt19937_64;
+using test::Random;
 using Surfaces = std::vector<NurbsSurface>;
-
-double uniform(Random& random, double lo, double hi) {
-  return std::uniform_real_distribution<double>(lo, hi)(random);
-}
-
-Quat random_rotation(Random& random) {
-  std::normal_distribution<double> normal;
-  return Quat(normal(random), normal(random), normal(random), normal(random)).normalized();
-}
 
 void move(Surfaces& body, const Mat3& linear, const Vec3& offset) {
   for (NurbsSurface& s : body) {
@@ -136,9 +127,9 @@ TEST(Connectivity, SixPatchesInEveryRandomLayout) {
   const double volume = build(original)->mass.volume;
   for (int trial = 0; trial < 20; ++trial) {
     Surfaces body = original;
-    for (NurbsSurface& s : body) s = relabel(s, std::uniform_int_distribution<int>(0, 7)(random));
-    std::shuffle(body.begin(), body.end(), random);
-    move(body, random_rotation(random).toRotationMatrix(), Vec3(5, -3, 2));
+    for (NurbsSurface& s : body) s = relabel(s, random.below(8));
+    std::shuffle(body.begin(), body.end(), random.engine());
+    move(body, random.turn().toRotationMatrix(), Vec3(5, -3, 2));
     std::vector<std::string> warnings;
     const auto shape = build(body, &warnings);
     expect_consistent(*shape);
@@ -306,9 +297,9 @@ TEST(Bounds, CentreOfMassIsTheOrigin) {
 TEST(Bounds, RadiiOfEllipsoidsAreTightAndSafe) {
   Random random(2);
   for (int trial = 0; trial < 10; ++trial) {
-    const Vec3 a(uniform(random, 0.2, 3), uniform(random, 0.2, 3), uniform(random, 0.2, 3));
+    const Vec3 a = random.box(0.2, 3);
     Surfaces body = exact_ellipsoid(a);
-    move(body, random_rotation(random).toRotationMatrix(), Vec3(1, 2, 3));
+    move(body, random.turn().toRotationMatrix(), Vec3(1, 2, 3));
     const auto shape = build(body);
     EXPECT_GE(shape->bounding_radius, a.maxCoeff() * (1 - 1e-14));
     EXPECT_LE(shape->bounding_radius, a.maxCoeff() * (1 + 1e-6));
@@ -371,7 +362,7 @@ TEST(Kinks, ImperfectBicubicJointsLoad) {
 TEST(Curvature, BoundsOfEllipsoidsHoldAndAreClose) {
   Random random(3);
   for (int trial = 0; trial < 10; ++trial) {
-    Vec3 a(uniform(random, 0.5, 2), uniform(random, 0.5, 2), uniform(random, 0.5, 2));
+    Vec3 a = random.box(0.5, 2);
     const auto shape = build(exact_ellipsoid(a));
     std::sort(a.data(), a.data() + 3);
     const double least = a[0] * a[0] / a[2], most = a[2] * a[2] / a[0];

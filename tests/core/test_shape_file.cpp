@@ -7,10 +7,10 @@
 #include <fstream>
 #include <functional>
 #include <nlohmann/json.hpp>
-#include <random>
 
 #include "io/shape_file.h"
 #include "shapes/primitives.h"
+#include "support/random.h"
 
 namespace nurbs {
 namespace {
@@ -123,15 +123,15 @@ TEST(ShapeFile, NameIsTheStemAndTheBodyIsBuilt) {
 }
 
 TEST(ShapeFile, RoundTripBitForBit) {
-  std::mt19937_64 random(1);
-  std::uniform_real_distribution<double> coordinate(-1, 1), weight(0.1, 5);
+  test::Random random(1);
   for (int trial = 0; trial < 20; ++trial) {
     ShapeFileContent content;
     content.surfaces = exact_ellipsoid({1, 1, 1});
     for (NurbsSurface& s : content.surfaces) {
       for (Vec4& p : s.points) {  // as a file gives them: products of a weight and Cartesian coordinates
-        const double w = weight(random), scale = std::pow(10, 8 * coordinate(random));
-        p = Vec4(w * (scale * coordinate(random)), w * (scale * coordinate(random)), w * 0.1, w);
+        const double w = random.uniform(0.1, 5), scale = std::pow(10, random.uniform(-8, 8));
+        const double x = scale * random.uniform(-1, 1), y = scale * random.uniform(-1, 1);
+        p = Vec4(w * x, w * y, w * 0.1, w);
       }
     }
     if (trial % 2) {

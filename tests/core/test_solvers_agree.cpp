@@ -8,35 +8,25 @@
 #include <cstdio>
 #include <limits>
 #include <memory>
-#include <random>
 #include <utility>
 #include <vector>
 
 #include "body/shape.h"
 #include "body/support.h"
 #include "contact/pair_search.h"
-#include "ellipsoid_oracle.h"
 #include "reference/cso.h"
 #include "shapes/primitives.h"
+#include "support/ellipsoid_oracle.h"
+#include "support/random.h"
 
 namespace nurbs {
 namespace {
 
 constexpr double kAgreement = 1e-9;  // of the smaller bounding radius
 
-class Pairs {
+class Pairs : public test::Random {
  public:
-  explicit Pairs(unsigned seed) : engine_(seed) {}
-  double uniform(double low, double high) {
-    return std::uniform_real_distribution<double>(low, high)(engine_);
-  }
-  double log_uniform(double low, double high) { return std::exp(uniform(std::log(low), std::log(high))); }
-  Vec3 direction() { return turn() * Vec3::UnitX(); }
-  Quat turn() {
-    std::normal_distribution<double> normal;
-    return Quat(normal(engine_), normal(engine_), normal(engine_), normal(engine_)).normalized();
-  }
-  int index(int count) { return std::uniform_int_distribution<int>(0, count - 1)(engine_); }
+  using Random::Random;
 
   Particle particle(const Shape& shape, double scale, const Vec3& x) {
     Particle p;
@@ -63,9 +53,6 @@ class Pairs {
   static double size(const Particle& a, const Particle& b) {
     return std::min(a.scale * a.shape->bounding_radius, b.scale * b.shape->bounding_radius);
   }
-
- private:
-  std::mt19937_64 engine_;
 };
 
 ContactResult solve_default(const Particle& a, const Particle& b, double tolerance = 1e-11) {
@@ -131,8 +118,8 @@ Count compare_many(const char* name, const Shapes& first, const Shapes& second, 
   Pairs pairs(seed);
   Count count;
   for (int k = 0; k < how_many; ++k) {
-    const Shape& sa = *first[pairs.index(static_cast<int>(first.size()))];
-    const Shape& sb = *second[pairs.index(static_cast<int>(second.size()))];
+    const Shape& sa = *first[pairs.below(static_cast<int>(first.size()))];
+    const Shape& sb = *second[pairs.below(static_cast<int>(second.size()))];
     const auto [a, b] = pairs.pair(sa, sb, random_overlap(pairs, depth));
     SCOPED_TRACE(testing::Message() << name << " pair " << k);
     compare(a, b, count);
@@ -267,7 +254,7 @@ TEST(ClosedForms, EllipsoidsAgainstTheOracleInBothSolvers) {
     int other_minimum = 0;
     double worst_default = 0, worst_cso = 0;
     for (int k = 0; k < 150; ++k) {
-      const int i = pairs.index(4), j = pairs.index(4);
+      const int i = pairs.below(4), j = pairs.below(4);
       const auto [a, b] = pairs.pair(*shapes[i], *shapes[j], random_overlap(pairs, depth));
       const auto exact = oracle::signed_distance(as_oracle(a, axes[i]), as_oracle(b, axes[j]));
       const double size = Pairs::size(a, b), gap = static_cast<double>(exact.gap);

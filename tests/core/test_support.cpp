@@ -1,7 +1,8 @@
 // Support mapping and direction atlas against exhaustive search and closed forms.
 #include <gtest/gtest.h>
 
-#include "bodies.h"
+#include "support/bodies.h"
+#include "support/random.h"
 
 namespace nurbs {
 namespace {

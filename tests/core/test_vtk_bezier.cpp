@@ -1,12 +1,12 @@
 // Bezier patches as VTK cells: the point order against VTK's own, and that nothing of the patch is lost.
 #include <gtest/gtest.h>
 
-#include <random>
 #include <set>
 #include <vector>
 
 #include "io/vtk_bezier.h"
 #include "nurbs/bezier_patch.h"
+#include "support/random.h"
 
 namespace nurbs {
 namespace {
@@ -34,13 +34,15 @@ TEST(VtkPointIndex, numbers_every_control_point_once) {
 }
 
 TEST(VtkBezierCell, holds_the_projected_control_points_and_weights) {
-  std::mt19937 random(7);
-  std::uniform_real_distribution<double> uniform(0.5, 2);
+  test::Random random(7);
   BezierPatch patch;
   patch.degree_u = 4;
   patch.degree_v = 3;
   for (int k = 0; k < 20; ++k) {
-    patch.points.emplace_back(uniform(random), uniform(random), uniform(random), uniform(random));
+    {
+      const Vec3 p = random.box(0.5, 2);
+      patch.points.emplace_back(p[0], p[1], p[2], random.uniform(0.5, 2));
+    }
   }
   const VtkBezierCell cell = vtk_bezier_cell(patch);
   EXPECT_EQ(cell.degree_u, 4);

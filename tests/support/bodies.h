@@ -1,15 +1,12 @@
-// Bodies and random placements shared by the contact tests.
+// Bodies shared by the contact tests, and their supports by exhaustive search.
 #pragma once
 
-#include <cmath>
+#include <algorithm>
 #include <memory>
-#include <random>
-#include <string>
 #include <vector>
 
 #include "body/shape.h"
 #include "body/support.h"
-#include "contact/contact.h"
 #include "shapes/primitives.h"
 
 namespace nurbs::test {
@@ -77,55 +74,6 @@ inline Maxima all_maxima(const Shape& shape, const Vec3& d) {
 }
 inline double exhaustive_support(const Shape& shape, const Vec3& d) {
   return all_maxima(shape, d).best;
-}
-
-class Random {
- public:
-  explicit Random(unsigned seed) : engine_(seed) {}
-  double uniform(double low, double high) {
-    return std::uniform_real_distribution<double>(low, high)(engine_);
-  }
-  Vec3 direction() {
-    std::normal_distribution<double> n;
-    return Vec3(n(engine_), n(engine_), n(engine_)).normalized();
-  }
-  Quat turn() {
-    std::normal_distribution<double> n;
-    return Quat(n(engine_), n(engine_), n(engine_), n(engine_)).normalized();
-  }
-  // Turn by `angle` about a random axis.
-  Quat turn_by(double angle) { return Quat(Eigen::AngleAxisd(angle, direction())); }
-
- private:
-  std::mt19937_64 engine_;
-};
-
-struct Pair {
-  Particle a, b;
-};
-
-// Random orientations; the supports along a random direction are `gap` apart (< 0: overlapping) along it, so
-// the true gap is `gap` for smooth bodies that are apart or overlap little.
-inline Pair random_pair(Random& random, const Shape& sa, const Shape& sb, double gap,
-                        Vec3* direction = nullptr) {
-  Pair pair;
-  pair.a.shape = &sa;
-  pair.b.shape = &sb;
-  pair.a.q = random.turn();
-  pair.b.q = random.turn();
-  pair.b.scale = random.uniform(0.5, 1.5);
-  const Vec3 d = random.direction();
-  const Vec3 on_a = pair.a.q * find_support(sa, pair.a.q.conjugate() * d).point;
-  const Vec3 on_b = pair.b.q * find_support(sb, pair.b.q.conjugate() * -d).point;
-  pair.b.x = on_a - pair.b.scale * on_b + gap * d;
-  if (direction) *direction = d;
-  return pair;
-}
-
-// p(d) = h_A(d) + h_B(-d) - d . (x_B - x_A), d in the lab.
-inline double overlap_along(const Particle& a, const Particle& b, const Vec3& d) {
-  return a.scale * find_hull_support(*a.shape, a.q.conjugate() * d).h +
-         b.scale * find_hull_support(*b.shape, b.q.conjugate() * -d).h - d.dot(b.x - a.x);
 }
 
 }  // namespace nurbs::test

@@ -3,28 +3,15 @@
 #pragma once
 
 #include <functional>
-#include <random>
 #include <string>
 #include <vector>
 
 #include "contact/contact.h"
+#include "support/random.h"
 
 namespace nurbs::families {
 
-// Deterministic numbers; every pair of a family has its own seed, so any one of them can be replayed alone.
-class Random {
- public:
-  explicit Random(unsigned long seed) : engine_(seed) {}
-  double uniform(double low, double high);
-  double log_uniform(double low, double high);
-  int below(int n);
-  double sign();
-  Vec3 direction();
-  Quat turn();
-
- private:
-  std::mt19937_64 engine_;
-};
+using test::Random;  // every pair of a family has its own seed, so any one of them can be replayed alone
 
 // What is known about a pair.
 enum class Known {

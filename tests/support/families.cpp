@@ -1,5 +1,5 @@
 // How each family is built and where its truth comes from; see families.h.
-#include "families.h"
+#include "support/families.h"
 
 #include <algorithm>
 #include <cmath>
@@ -7,37 +7,14 @@
 #include <map>
 #include <memory>
 
-#include "../tests/core/bodies.h"
-#include "../tests/core/ellipsoid_oracle.h"
 #include "body/support.h"
 #include "contact/pair_search.h"
 #include "nurbs/tolerances.h"
 #include "shapes/primitives.h"
+#include "support/ellipsoid_oracle.h"
+#include "support/pairs.h"
 
 namespace nurbs::families {
-
-double Random::uniform(double low, double high) {
-  return std::uniform_real_distribution<double>(low, high)(engine_);
-}
-double Random::log_uniform(double low, double high) {
-  return std::exp(uniform(std::log(low), std::log(high)));
-}
-int Random::below(int n) {
-  return std::uniform_int_distribution<int>(0, n - 1)(engine_);
-}
-double Random::sign() {
-  return below(2) ? 1 : -1;
-}
-Vec3 Random::direction() {
-  std::normal_distribution<double> n;
-  const double x = n(engine_), y = n(engine_), z = n(engine_);
-  return Vec3(x, y, z).normalized();
-}
-Quat Random::turn() {
-  std::normal_distribution<double> n;
-  const double w = n(engine_), x = n(engine_), y = n(engine_), z = n(engine_);
-  return Quat(w, x, y, z).normalized();
-}
 
 namespace {
 
