@@ -7,12 +7,10 @@
 #include <limits>
 #include <queue>
 
+#include "nurbs/tolerances.h"
+
 namespace nurbs {
 namespace {
-
-constexpr double kRelativeWidth = 1e-6;  // of the squared radius, at which a bound is tight enough
-constexpr int kMaxSplits = 4000;
-constexpr double kRoundOff = 1e-13;  // relative, of products and halvings of the coefficients
 
 // The field num / den over a rectangle, both in Bernstein form of degree (m, n), coefficient (i, j) at i (n +
 // 1) + j.
@@ -136,7 +134,7 @@ double bound_squared(const std::vector<BezierPatch>& patches, double sign) {
   }
   for (int split = 0; split < kMaxSplits; ++split) {
     const Field& worst = open.top();
-    if (worst.upper - reached <= kRelativeWidth * std::abs(reached)) break;
+    if (worst.upper - reached <= kBoundWidth * std::abs(reached)) break;
     const bool in_u = bends_more_in_u(worst);
     auto [f, g] = halve(worst, in_u);
     open.pop();
@@ -144,7 +142,7 @@ double bound_squared(const std::vector<BezierPatch>& patches, double sign) {
     open.push(std::move(f));
     open.push(std::move(g));
   }
-  return open.top().upper + kRoundOff * magnitude;
+  return open.top().upper + kBernsteinRoundoff * magnitude;
 }
 
 }  // namespace

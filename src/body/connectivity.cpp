@@ -6,13 +6,10 @@
 #include <limits>
 
 #include "body/local_form.h"
+#include "nurbs/tolerances.h"
 
 namespace nurbs {
 namespace {
-
-constexpr int kEdgeSamples = 5;         // points at which two edge curves are first compared
-constexpr int kKinkSamples = 17;        // points at which the normals of two sides are compared
-constexpr int kProjectionSamples = 32;  // starts of the search for the closest point of a curve
 
 struct Edge {
   int patch = 0, edge = 0;
@@ -60,7 +57,7 @@ double closest_parameter(const BezierPatch& patch, int edge, const Vec3& x) {
   double lo = std::max(0, best - 1) / double(kProjectionSamples);
   double hi = std::min(kProjectionSamples, best + 1) / double(kProjectionSamples);
   constexpr double kGolden = 0.6180339887498949;
-  for (int i = 0; i < 45; ++i) {
+  for (int i = 0; i < kProjectionSections; ++i) {
     const double a = hi - kGolden * (hi - lo), b = lo + kGolden * (hi - lo);
     const bool left =
         (edge_point(patch, edge, a) - x).squaredNorm() < (edge_point(patch, edge, b) - x).squaredNorm();
@@ -184,7 +181,7 @@ double refine_closest(const BezierPatch& patch, int edge, const Vec3& x, double 
     const Vec3& along = edge < 2 ? j.sv : j.su;
     const double before = t;
     t = std::clamp(t + (x - j.s).dot(along) / along.squaredNorm(), 0.0, 1.0);
-    if (std::abs(t - before) < 1e-12) break;
+    if (std::abs(t - before) < kParameterRoundoff) break;
   }
   return t;
 }
@@ -250,7 +247,8 @@ double spread_of_normals(const BezierPatch& patch, int edge, double inset) {
 // Spread of the normals in the limit at the pole: what is left after extrapolating the part proportional to
 // the distance from it, which any smooth pole has.
 double pole_kink(const BezierPatch& patch, int edge) {
-  const double far = spread_of_normals(patch, edge, 2e-4), near = spread_of_normals(patch, edge, 1e-4);
+  const double far = spread_of_normals(patch, edge, 2 * kPoleInset),
+               near = spread_of_normals(patch, edge, kPoleInset);
   return std::max(0.0, 2 * near - far);
 }
 

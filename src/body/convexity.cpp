@@ -9,18 +9,10 @@
 
 #include "body/local_form.h"
 #include "body/support.h"
+#include "nurbs/tolerances.h"
 
 namespace nurbs {
 namespace {
-
-constexpr int kPairsIfConvex = 1200, kPairsIfDented = 4000;  // samples compared with each other
-constexpr int kStarts = 1000;      // samples from which the best start of a support is taken
-constexpr double kNoDent = 1e-13;  // of the size: round-off of a support
-constexpr int kTiltSteps = 24;     // golden sections per direction in the search for the nearest hull plane
-constexpr int kMostCuts = 30;      // supports spent on one depth
-constexpr double kDepthTolerance = 1e-3;
-constexpr double kWidestTilt = 2;  // tangent of the largest tilt of that plane against the surface
-constexpr int kPlaceRounds = 5;    // halvings of the sample step in the search for the deepest point
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
@@ -100,7 +92,7 @@ Minimum minimise(const Function& f, double range) {
   constexpr double kGolden = 0.6180339887498949;
   double lo = -range, hi = range;
   double a = hi - kGolden * (hi - lo), b = lo + kGolden * (hi - lo), fa = f(a), fb = f(b);
-  for (int i = 0; i < kTiltSteps; ++i) {
+  for (int i = 0; i < kTiltSections; ++i) {
     if (fa < fb) {
       hi = b, b = a, fb = fa;
       a = hi - kGolden * (hi - lo), fa = f(a);
@@ -240,7 +232,7 @@ const SurfaceSample& most_concave(const std::vector<SurfaceSample>& samples) {
 Dent find_dent(const Shape& shape, const std::vector<SurfaceSample>& samples, const KinkSummary& kinks) {
   const double size = shape.bounding_radius;
   const SurfaceSample& concave = most_concave(samples);
-  const bool suspect = kinks.concave > kKinkNoise || concave.k_min < -kCurvatureNoise / size;
+  const bool suspect = kinks.concave > kNoKink || concave.k_min < -kCurvatureNoise / size;
   const Clouds clouds = choose(samples, suspect ? kPairsIfDented : kPairsIfConvex);
   const std::vector<double> support = sampled_support(clouds), depth = sampled_depth(clouds, support);
   std::vector<double> excess = support;
@@ -254,7 +246,7 @@ Dent find_dent(const Shape& shape, const std::vector<SurfaceSample>& samples, co
   if (!suspect && excess[highest] <= kNoDent * size) return dent;
 
   const double step = 1 / (std::sqrt(static_cast<double>(samples.size() / shape.patches.size())) - 1);
-  const Clouds starts = choose(samples, kStarts);
+  const Clouds starts = choose(samples, kDentStarts);
   const Probe probe(shape, starts, step);
   SurfacePoint where;
   const std::vector<SurfacePoint> places = {clouds.places[highest], clouds.places[deepest], concave.where,

@@ -7,16 +7,13 @@
 #include <limits>
 
 #include "body/local_form.h"
+#include "nurbs/tolerances.h"
 
 namespace nurbs {
 namespace {
 
-constexpr int kSamples = 3000;  // aimed at, over the body
-constexpr int kLeastPerEdge = 4, kMostPerEdge = 24;
-constexpr int kPatternRounds = 14;  // halvings of the grid step in a curvature search
-
 int samples_per_edge(size_t patches) {
-  const double n = std::sqrt(kSamples / static_cast<double>(patches));
+  const double n = std::sqrt(kSurfaceSamples / static_cast<double>(patches));
   return std::clamp(static_cast<int>(std::lround(n)), kLeastPerEdge, kMostPerEdge);
 }
 
@@ -56,7 +53,7 @@ double upper_curvature(const CurvatureAt& k, const SurfacePoint& start, double s
       change = std::max(change, best - k(u, v));
     }
   }
-  return best + 0.1 * change + 1e-6 * std::abs(best);
+  return best + kChangeShare * change + kCurvatureMargin * std::abs(best);
 }
 
 // Largest of sign * k over the patch's samples [first, last).
@@ -107,8 +104,8 @@ CurvatureBounds bound_patch_curvature(const std::vector<BezierPatch>& patches,
 
 CurvatureBounds add_kinks(const CurvatureBounds& patches, const KinkSummary& kinks) {
   CurvatureBounds bounds = patches;
-  if (kinks.convex > kKinkNoise) bounds.min_radius = 0;
-  if (kinks.concave > kKinkNoise) bounds.max_radius = std::numeric_limits<double>::infinity();
+  if (kinks.convex > kNoKink) bounds.min_radius = 0;
+  if (kinks.concave > kNoKink) bounds.max_radius = std::numeric_limits<double>::infinity();
   return bounds;
 }
 

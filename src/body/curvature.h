@@ -8,11 +8,6 @@
 
 namespace nurbs {
 
-// Times a body's size: curvatures up to this are round-off.
-constexpr double kCurvatureNoise = 1e-9;
-// Kinks up to this, rad, are round-off.
-constexpr double kKinkNoise = 1e-7;
-
 struct SurfaceSample {
   SurfacePoint where;
   Vec3 point, normal;   // normal outward
@@ -31,7 +26,7 @@ CurvatureBounds bound_patch_curvature(const std::vector<BezierPatch>& patches,
                                       const std::vector<SurfaceSample>& samples);
 
 // The strict bounds of the whole body's convex hull: an opening kink is a crease (radius 0), a closing one is
-// bridged by a flat strip (infinite radius). Kinks up to 1e-7 rad count as none. Imperfect joints therefore
+// bridged by a flat strip (infinite radius). Kinks up to kNoKink count as none. Imperfect joints therefore
 // give (0, infinity).
 CurvatureBounds add_kinks(const CurvatureBounds& patches, const KinkSummary& kinks);
 

@@ -99,8 +99,8 @@ void best_samples(const std::vector<Sample>& samples, const Vec3& d, const Sampl
 
 }  // namespace
 
-void build_atlas(Shape& shape, int cells) {
-  DirectionAtlas& atlas = shape.atlas;
+DirectionAtlas make_atlas(const Shape& shape, int cells) {
+  DirectionAtlas atlas;
   const std::vector<Sample> samples = sample_patches(shape);
   const size_t count = 6u * static_cast<size_t>((cells + 1) * (cells + 1));
   atlas.cells = cells;
@@ -124,6 +124,7 @@ void build_atlas(Shape& shape, int cells) {
     atlas.point[node] = support.point;
     atlas.where[node] = support.where;
   }
+  return atlas;
 }
 
 }  // namespace nurbs

@@ -35,7 +35,7 @@ struct DirectionAtlas {
   int nodes() const { return static_cast<int>(support.size()); }
 };
 
-// Fills the atlas of a shape whose patches, links and bounds are done. Milliseconds; 97 kB at 16 cells.
-void build_atlas(Shape& shape, int cells);
+// The atlas of a shape whose patches, links, bounds and curvatures are done. Milliseconds; 97 kB at 16 cells.
+DirectionAtlas make_atlas(const Shape& shape, int cells);
 
 }  // namespace nurbs

@@ -4,12 +4,10 @@
 #include <algorithm>
 #include <cmath>
 
+#include "nurbs/tolerances.h"
+
 namespace nurbs {
 namespace {
-
-// |Su x Sv| below this share of the middle's |Su| |Sv| makes the point singular. Curvature loses the square
-// of this ratio in digits: about eight remain.
-constexpr double kSingularCross = 5e-5;
 
 double tangent_size(const BezierPatch& patch) {
   const Jet1 j = evaluate1(patch, 0.5, 0.5);
@@ -43,8 +41,8 @@ LocalForm from_jet(const Jet2& j, double u, double v) {
 LocalForm local_form(const BezierPatch& patch, double u, double v) {
   const double size = tangent_size(patch);
   Jet2 jet = evaluate2(patch, u, v);
-  for (double step = 1e-4; step < 2e-3 && !(jet.su.cross(jet.sv).norm() > kSingularCross * size);
-       step *= 10) {
+  for (const double step : kInsets) {
+    if (jet.su.cross(jet.sv).norm() > kSingularCross * size) break;
     u += step * (0.5 - u) * 2;
     v += step * (0.5 - v) * 2;
     jet = evaluate2(patch, u, v);

@@ -5,11 +5,10 @@
 #include <algorithm>
 #include <cmath>
 
+#include "nurbs/tolerances.h"
+
 namespace nurbs {
 namespace {
-
-constexpr double kMomentTolerance = 1e-12;  // of each moment, per integration cell
-constexpr int kMaxHalvings = 10;            // of a cell; reached only at a singular patch corner
 
 // Volume, first moments x y z, second moments xx yy zz xy xz yz.
 using Moments = Eigen::Array<double, 10, 1>;
@@ -155,7 +154,7 @@ MassProperties integrate_mass(const std::vector<BezierPatch>& patches) {
 
 PrincipalFrame principal_frame(const Mat3& tensor) {
   Mat3 clean = tensor;
-  const double round_off = 1e-13 * tensor.diagonal().cwiseAbs().maxCoeff();
+  const double round_off = kMomentRoundoff * tensor.diagonal().cwiseAbs().maxCoeff();
   for (int i = 0; i < 3; ++i) {
     for (int j = 0; j < 3; ++j) {
       if (i != j && std::abs(tensor(i, j)) <= round_off) clean(i, j) = 0;

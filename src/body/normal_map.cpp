@@ -22,7 +22,7 @@ void paint(const Vec3& center, double angle, double radius, NormalMap& map) {
   for (int k = 0; k < 3; ++k)
     for (const double side : {1.0, -1.0}) {
       const double major = side * center[k];
-      if (major < 0.3) continue;  // further than a cap from this face: those are at most 0.2 rad
+      if (major < 0.3) continue;  // further than a cap from this face: those are at most kNormalCap wide
       const double a = center[(k + 1) % 3] / major, b = center[(k + 2) % 3] / major;
       const double reach = 1.3 * angle * (1 + a * a + b * b);
       if (std::abs(a) - reach > 1 || std::abs(b) - reach > 1) continue;
@@ -35,7 +35,8 @@ void paint(const Vec3& center, double angle, double radius, NormalMap& map) {
 
 class Painter {
  public:
-  explicit Painter(Shape& shape) : shape_(shape), flat_(kCurvatureNoise / shape.bounding_radius) {}
+  Painter(const Shape& shape, NormalMap& map)
+      : shape_(shape), map_(map), flat_(kCurvatureNoise / shape.bounding_radius) {}
 
   void paint_patches() {
     for (size_t p = 0; p < shape_.patches.size(); ++p)
@@ -68,8 +69,8 @@ class Painter {
       for (int k = 0; k < 4; ++k) paint_quad(patch, 2 * i + k / 2, 2 * j + k % 2, 2 * n, depth + 1);
       return;
     }
-    const double radius = even ? 1.1 * largest : largest * (largest / least);
-    paint(normal[0], 1.2 * spread + kNormalMargin, radius, shape_.normal_map);
+    const double radius = even ? kRadiusSafety * largest : largest * (largest / least);
+    paint(normal[0], kCapSafety * spread + kNormalMargin, radius, map_);
   }
 
   // The normals of both sides and those between.
@@ -87,13 +88,14 @@ class Painter {
       }
       const Vec3 middle = (here + there).normalized();
       const double step = k > 0 ? angle_between(before, middle) : 0;
-      const double half = 1.5 * angle_between(middle, here);
-      paint(middle, std::min(0.2, step + half + kNormalMargin), kInfinity, shape_.normal_map);
+      const double half = kJointCapSafety * angle_between(middle, here);
+      paint(middle, std::min(kNormalCap, step + half + kNormalMargin), kInfinity, map_);
       before = middle;
     }
   }
 
-  Shape& shape_;
+  const Shape& shape_;
+  NormalMap& map_;
   double flat_;  // curvatures up to this are none
 };
 
@@ -106,16 +108,17 @@ double NormalMap::radius_at(const Vec3& n) const {
   return radius[(c.face * cells + cube_cell(c.a, cells)) * cells + cube_cell(c.b, cells)];
 }
 
-void build_normal_map(Shape& shape) {
-  NormalMap& map = shape.normal_map;
-  if (!shape.dented() && shape.patch_curvature.max_radius <= kLongRadius * shape.bounding_radius) return;
+NormalMap make_normal_map(const Shape& shape) {
+  NormalMap map;
+  if (!shape.dented() && shape.patch_curvature.max_radius <= kLongRadius * shape.bounding_radius) return map;
   map.cells = kNormalCells;
   map.radius.assign(6u * kNormalCells * kNormalCells, 0);
-  Painter painter(shape);
+  Painter painter(shape, map);
   painter.paint_patches();
   painter.paint_kinks();
   for (float& radius : map.radius)  // a cell no normal was seen in: sharper than the samples
     if (radius == 0) radius = std::numeric_limits<float>::infinity();
+  return map;
 }
 
 }  // namespace nurbs

@@ -25,9 +25,10 @@ struct NormalMap {
   double radius_at(const Vec3& normal) const;
 };
 
-// Made for bodies with dents, or whose largest curvature radius exceeds kLongRadius bounding radii; empty for
-// others. From samples on an adaptive grid, widened by a tenth; kinked joints are marked as infinite. Not a
-// proof, as the curvature bounds it replaces. Some ms, 100 kB.
-void build_normal_map(Shape& shape);
+// Of a shape whose patches, links, bounds, dents and curvatures are done, if it has dents or its largest
+// curvature radius exceeds kLongRadius bounding radii; empty for others. From samples on an adaptive grid,
+// widened by a tenth; kinked joints are marked as infinite. Not a proof, as the curvature bounds it replaces.
+// Some ms, 100 kB.
+NormalMap make_normal_map(const Shape& shape);
 
 }  // namespace nurbs

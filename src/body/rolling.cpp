@@ -23,14 +23,13 @@ std::array<double, 2> least_speed(const BezierPatch& patch) {
       least[0] = std::min(least[0], lv > 0 ? area / lv : 0);
       least[1] = std::min(least[1], lu > 0 ? area / lu : 0);
     }
-  return {0.9 * least[0], 0.9 * least[1]};
+  return {kSpeedSafety * least[0], kSpeedSafety * least[1]};
 }
 
 }  // namespace
 
-void measure_joint_distance(Shape& shape) {
-  JointDistance& joints = shape.joints;
-  joints = JointDistance();
+JointDistance measure_joint_distance(const Shape& shape) {
+  JointDistance joints;
   joints.width = kInfinity;
   for (size_t p = 0; p < shape.patches.size(); ++p) {
     const std::array<double, 2> least = least_speed(shape.patches[p]);
@@ -46,6 +45,7 @@ void measure_joint_distance(Shape& shape) {
     joints.width = std::min({joints.width, least[0], least[1]});
     joints.speed.push_back(speed);
   }
+  return joints;
 }
 
 RollingRadii rolling_radii(const Shape& shape, const SurfacePoint& at, const Vec3& normal) {

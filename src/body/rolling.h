@@ -39,8 +39,8 @@ inline double rolling_excess(double outer, double bounding_radius, double chord2
   return rolling < wedge ? rolling : wedge;
 }
 
-// Fills shape.joints from links, patches and curvatures.
-void measure_joint_distance(Shape& shape);
+// Of a shape whose patches and links, with their kinks, are done.
+JointDistance measure_joint_distance(const Shape& shape);
 
 // Let r0 and P0 be the least and largest curvature radius inside the patches and s the distance to the
 // nearest kinked joint. Without kinks the radii are r0 and P0 (Blaschke). Otherwise, in a normal section, the

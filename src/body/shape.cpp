@@ -146,7 +146,7 @@ void orient_and_weigh(Draft& draft) {
     s.mass.inertia = -s.mass.inertia;
   }
   const double size = diagonal(s.patches);
-  if (!(s.mass.volume > 1e-12 * size * size * size)) {
+  if (!(s.mass.volume > kLeastVolume * size * size * size)) {
     throw ShapeError("the patches enclose no volume: " + number(s.mass.volume));
   }
   warn_of_turned(draft);
@@ -167,22 +167,25 @@ std::string place(const Draft& draft, const SurfacePoint& at) {
   return "patch " + std::to_string(surface) + ", u=" + number(u) + ", v=" + number(v);
 }
 
-void check_convex(Draft& draft, const std::vector<SurfaceSample>& samples, const KinkSummary& kinks) {
-  Shape& s = draft.shape;
-  const Dent dent = find_dent(s, samples, kinks);
-  s.concavity = dent.depth;
-  s.support_excess = dent.excess;
-  const double allowed = kAllowedDent * s.bounding_radius;
+// Refuses dents that the convex hull can't stand for, and mentions others.
+void judge_dent(Draft& draft, const Dent& dent) {
+  const double radius = draft.shape.bounding_radius, allowed = kAllowedDent * radius;
   if (dent.depth > allowed) {
     throw ShapeError("not convex: " + place(draft, dent.where) + ", depth " + number(dent.depth) +
                      " (allowed " + number(allowed) + ")");
   }
-  if (dent.depth > kUnmentionedDent * s.bounding_radius) {
+  if (dent.depth > kUnmentionedDent * radius) {
     draft.warnings.push_back("not quite convex: " + place(draft, dent.where) + ", depth " +
                              number(dent.depth) + "; contact bridges it with the convex hull");
   }
 }
 
+CurvatureBounds inside_patches(const Shape& s, const std::vector<SurfaceSample>& samples) {
+  if (s.inner_radius >= (1 - kSphere) * s.bounding_radius) return {s.bounding_radius, s.bounding_radius};
+  return bound_patch_curvature(s.patches, samples);
+}
+
+// The body's size, form and search tables. Each needs some of those above it.
 void measure(Draft& draft) {
   Shape& s = draft.shape;
   const RadiusBounds radius = bound_radius(s.patches);
@@ -191,35 +194,39 @@ void measure(Draft& draft) {
   const KinkSummary kinks = measure_kinks(s.patches, s.links);
   s.smooth = std::max(kinks.convex, kinks.concave) <= kSmoothKink;
   const std::vector<SurfaceSample> samples = sample_surface(s.patches);
-  check_convex(draft, samples, kinks);
-  s.patch_curvature = bound_patch_curvature(s.patches, samples);
-  if (s.inner_radius >= (1 - kSphere) * s.bounding_radius)
-    s.patch_curvature = {s.bounding_radius, s.bounding_radius};
+  const Dent dent = find_dent(s, samples, kinks);
+  judge_dent(draft, dent);
+  s.concavity = dent.depth;
+  s.support_excess = dent.excess;
+  s.patch_curvature = inside_patches(s, samples);
   s.curvature = add_kinks(s.patch_curvature, kinks);
-  measure_joint_distance(s);
-  build_normal_map(s);
   for (const BezierPatch& patch : s.patches) s.curvature_rate.push_back(bound_curvature_rate(patch));
+  s.joints = measure_joint_distance(s);
+  s.normal_map = make_normal_map(s);
+  s.atlas = make_atlas(s, kAtlasCells);
 }
 
-void set_gyration(Shape& s, const std::optional<Mat3>& given) {
-  s.gyration = given ? *given : Mat3(s.mass.inertia / s.mass.volume);
-  if (given && !given->allFinite()) throw ShapeError("gyration must be finite");
-  if (given && (*given - given->transpose()).cwiseAbs().maxCoeff() > 1e-12 * given->cwiseAbs().maxCoeff()) {
+void check_gyration(const Mat3& given) {
+  if (!given.allFinite()) throw ShapeError("gyration must be finite");
+  if ((given - given.transpose()).cwiseAbs().maxCoeff() > kGivenAsymmetry * given.cwiseAbs().maxCoeff()) {
     throw ShapeError("gyration must be symmetric");
   }
-  const PrincipalFrame frame = principal_frame(s.gyration);
-  const Vec3& m = frame.moments;
+  const Vec3 m = principal_frame(given).moments;
   const std::string values = number(m[0]) + ", " + number(m[1]) + ", " + number(m[2]);
-  if (given && !(m[0] > 0))
-    throw ShapeError("gyration must be positive definite: its eigenvalues are " + values);
-  if (given && m[2] > (m[0] + m[1]) * (1 + 1e-9)) {
+  if (!(m[0] > 0)) throw ShapeError("gyration must be positive definite: its eigenvalues are " + values);
+  if (m[2] > (m[0] + m[1]) * (1 + kGivenExcess)) {
     throw ShapeError("gyration is not that of a body: its eigenvalues are " + values +
                      ", the largest must not exceed the sum of the others");
   }
+}
+
+void set_gyration(Shape& s, const Mat3& gyration) {
+  const PrincipalFrame frame = principal_frame(gyration);
+  s.gyration = gyration;
+  s.inverse_gyration = gyration.inverse();
   s.principal_gyration = frame.moments;
   s.principal_axes = frame.axes;
-  s.inverse_gyration = s.gyration.inverse();
-  s.sphere_like = frame.moments[2] - frame.moments[0] <= 1e-13 * frame.moments[2];
+  s.sphere_like = frame.moments[2] - frame.moments[0] <= kMomentRoundoff * frame.moments[2];
 }
 
 // FNV-1a (Fowler, Noll & Vo) over the bytes of the surfaces.
@@ -243,9 +250,9 @@ void build(Draft& draft, const std::optional<Mat3>& gyration) {
   connect(draft);
   orient_and_weigh(draft);
   move_to_center(draft.shape);
-  set_gyration(draft.shape, gyration);
+  if (gyration) check_gyration(*gyration);
+  set_gyration(draft.shape, gyration ? *gyration : Mat3(draft.shape.mass.inertia / draft.shape.mass.volume));
   measure(draft);
-  build_atlas(draft.shape, kAtlasCells);
   draft.shape.stamp = content_stamp(draft.shape);
 }
 

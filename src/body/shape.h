@@ -41,7 +41,7 @@ struct MassProperties {  // of the uniform solid of unit density, at scale 1
 
 // Radii of curvature over the whole surface: every normal curvature lies in [1/max_radius, 1/min_radius].
 // min_radius is 0 for a body with a convex crease or corner; max_radius is infinite for one with a flat part.
-// Conservative: sampled, refined and widened, see convexity.h.
+// Conservative: sampled, refined and widened, see curvature.h.
 struct CurvatureBounds {
   double min_radius = 0;
   double max_radius = 0;
@@ -77,15 +77,6 @@ struct Shape {
   // Whether a local maximum of d . x may be no global one.
   bool dented() const { return support_excess > kRoundoff * bounding_radius; }
 };
-
-// What make_shape accepts, relative to the diagonal of the body's box (gap) or to its bounding radius
-// (depth).
-constexpr double kJoinTolerance = 1e-6;  // gap between two edges that count as joined
-constexpr double kAllowedDent =
-    1e-3;  // depth up to which a dent is left to the convex hull, with a warning ...
-constexpr double kUnmentionedDent = 1e-6;  // ... or without one
-// Kinks up to this (rad) count as smooth: ignoring one moves a support by kink^2/8, 1e-13 of the radius.
-constexpr double kSmoothKink = 1e-6;
 
 // A shape that can't be used; what() is one line made for the user.
 struct ShapeError : std::runtime_error {

@@ -57,10 +57,8 @@ bool ascends_into(const Jet1& jet, const SurfacePoint& at, int edge, const Vec3&
 // At a pole the parametrisation is singular: among all patches that collapse there, finds the ray of steepest
 // ascent. Returns its slope (<= 0: the pole itself is the maximum) and where to go on.
 double leave_pole(const Shape& shape, const Vec3& pole, const Vec3& d, SurfacePoint* out) {
-  constexpr double kInside =
-      0.25;  // furthest from the pole, in parameters, at which the search is taken up again
   double best = 0;
-  const double near = 1e-9 * shape.bounding_radius;
+  const double near = kSamePole * shape.bounding_radius;
   for (int p = 0; p < static_cast<int>(shape.patches.size()); ++p) {
     for (int edge = 0; edge < 4; ++edge) {
       if (!shape.links[p][edge].collapsed) continue;
@@ -77,7 +75,7 @@ double leave_pole(const Shape& shape, const Vec3& pole, const Vec3& d, SurfacePo
         // back.
         const double first = std::abs(d.dot(pins_u(edge) ? jet.su : jet.sv));
         const double second = -d.dot(pins_u(edge) ? jet.suu : jet.svv);
-        const double inside = second > 0 ? std::min(kInside, first / second) : kInside;
+        const double inside = second > 0 ? std::min(kPoleRestart, first / second) : kPoleRestart;
         (pins_u(edge) ? out->u : out->v) = pinned_value(edge) > 0 ? 1 - inside : inside;
       }
     }
@@ -105,12 +103,12 @@ struct Step {
   double length = 0;  // of the step on the surface
 };
 
-Step ascend_along(double g, double h, double metric) {
+// On one parameter; `size` is the body's.
+Step ascend_along(double g, double h, double metric, double size) {
   Step step;
   if (!(metric > 0)) return step;
   step.slope = std::abs(g) / std::sqrt(metric);
-  const double flat = 1e-12 * metric;
-  step.du = h < -flat ? -g / h : (g > 0 ? 1.0 : g < 0 ? -1.0 : 0.0);
+  step.du = h * size < -kFlatCurvature * metric ? -g / h : (g > 0 ? 1.0 : g < 0 ? -1.0 : 0.0);
   step.du = std::clamp(step.du, -1.0, 1.0);
   step.length = std::abs(step.du) * std::sqrt(metric);
   return step;
@@ -138,22 +136,23 @@ void saddle_free_step(const Model& m, double area2, Step* step) {
   go(-sn, c, mean - split);
 }
 
-// Newton step on the free parameters; where the Hessian is not negative definite, a saddle-free one.
-Step ascend(const Model& m, bool free_u, bool free_v) {
+// Newton step on the free parameters; `size` is the body's. Where the Hessian is not negative definite, a
+// saddle-free one.
+Step ascend(const Model& m, double size, bool free_u, bool free_v) {
   if (!free_u && !free_v) return {};
-  if (!free_v) return ascend_along(m.gu, m.huu, m.e);
+  if (!free_v) return ascend_along(m.gu, m.huu, m.e, size);
   if (!free_u) {
-    Step step = ascend_along(m.gv, m.hvv, m.g);
+    Step step = ascend_along(m.gv, m.hvv, m.g, size);
     std::swap(step.du, step.dv);
     return step;
   }
   const double area2 = m.e * m.g - m.f * m.f;
-  if (!(area2 > 1e-24 * m.e * m.g) ||
+  if (!(area2 > kSingularMetric * m.e * m.g) ||
       std::min(m.e, m.g) <
           kPoleMetric *
               std::max(m.e, m.g)) {  // a degenerate point: only the non-vanishing direction is usable
-    if (m.e > m.g) return ascend_along(m.gu, m.huu, m.e);
-    Step step = ascend_along(m.gv, m.hvv, m.g);
+    if (m.e > m.g) return ascend_along(m.gu, m.huu, m.e, size);
+    Step step = ascend_along(m.gv, m.hvv, m.g, size);
     std::swap(step.du, step.dv);
     return step;
   }
@@ -161,7 +160,8 @@ Step ascend(const Model& m, bool free_u, bool free_v) {
   const double slope2 = (m.g * m.gu * m.gu - 2 * m.f * m.gu * m.gv + m.e * m.gv * m.gv) / area2;
   step.slope = std::sqrt(std::max(0.0, slope2));
   const double det = m.huu * m.hvv - m.huv * m.huv;
-  if (m.huu < 0 && det > 1e-12 * area2 * kFlatHessian) {
+  // det / area2 is the product of the curvatures of f along the surface, 1/length^2.
+  if (m.huu < 0 && det * size * size > kFlatCurvature * kFlatCurvature * area2) {
     step.du = (-m.hvv * m.gu + m.huv * m.gv) / det;
     step.dv = (m.huv * m.gu - m.huu * m.gv) / det;
   } else {
@@ -195,14 +195,14 @@ double share_inside(double x, double dx) {
 
 // Newton step that does not leave at once through an edge `at` lies on: if it would, though the gradient
 // points inward, first along the edge alone. (With no slope left along the edge the full step points inward.)
-Step inward_step(const Model& m, const SurfacePoint& at, bool free_u, bool free_v) {
-  const Step step = ascend(m, free_u, free_v);
+Step inward_step(const Model& m, double size, const SurfacePoint& at, bool free_u, bool free_v) {
+  const Step step = ascend(m, size, free_u, free_v);
   const auto leaves = [](double x, double dx) {
     return (x <= kOnEdge && dx < 0) || (x >= 1 - kOnEdge && dx > 0);
   };
   const bool leaves_u = leaves(at.u, step.du), leaves_v = leaves(at.v, step.dv);
   if (!leaves_u && !leaves_v) return step;
-  Step along = ascend(m, free_u && !leaves_u, free_v && !leaves_v);
+  Step along = ascend(m, size, free_u && !leaves_u, free_v && !leaves_v);
   along.slope = step.slope;
   return along;
 }
@@ -281,7 +281,7 @@ Support climb(const Shape& shape, const Vec3& d, SurfacePoint at) {
       break;
     }
     if (moved) continue;
-    const Step step = inward_step(model, at, !(closed & 3u), !(closed & 12u));
+    const Step step = inward_step(model, size, at, !(closed & 3u), !(closed & 12u));
     slope = step.slope;
     if (step.length <= kStepTolerance * size || step.slope <= kSlopeTolerance) {
       best.converged = true;
@@ -290,7 +290,7 @@ Support climb(const Shape& shape, const Vec3& d, SurfacePoint at) {
     bool gained = false;
     // Cut where it meets an edge, not clamped: a clamped Newton step need not ascend.
     double scale = std::min(share_inside(at.u, step.du), share_inside(at.v, step.dv));
-    for (int halving = 0; halving < 40; ++halving, scale *= 0.5) {
+    for (int halving = 0; halving < kStepHalvings; ++halving, scale *= 0.5) {
       SurfacePoint q = at;
       q.u = std::clamp(at.u + scale * step.du, 0.0, 1.0);
       q.v = std::clamp(at.v + scale * step.dv, 0.0, 1.0);

@@ -20,7 +20,8 @@ struct Particle {
 enum class Status {
   separated,   // proven apart; gap may be only a lower bound > 0 (points and normal then not set)
   converged,   // bracket [lower, upper] closer than the tolerance
-  unresolved,  // bracket wider than the tolerance: gap is its pessimistic (deepest certified) end
+  unresolved,  // bracket wider than the tolerance: gap is that of the best points and normal found, in the
+               // bracket (cso, the reference: its lower end, the overlap along that normal)
 };
 
 // Which rung of the ladder answered (compute nurbs/stats).

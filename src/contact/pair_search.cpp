@@ -26,9 +26,9 @@ NURBS_INLINE bool safe(const Particle& a, const Particle& b, double enough, cons
   const Vec3 offset = b.x - a.x;
   if (set_separated(proven_gap(proof, offset, a.q, ra, b.q, rb, enough), enough, Rung::safe, r)) return true;
   const double spheres2 = offset.squaredNorm(), reach = ra + rb;
-  constexpr double kSafe = 1 - 8 * kRoundoff;
+  constexpr double kRounded = 1 - 8 * kRoundoff;  // of the root and the difference
   return spheres2 > reach * reach &&
-         set_separated((std::sqrt(spheres2) - reach) * kSafe, enough, Rung::safe, r);
+         set_separated((std::sqrt(spheres2) - reach) * kRounded, enough, Rung::safe, r);
 }
 
 class Ladder {

@@ -51,9 +51,6 @@ Vec3 nearest_on_triangle(const Vec3& a, const Vec3& b, const Vec3& c) {
   return {va / sum, vb / sum, vc / sum};
 }
 
-constexpr double kWaves = 37;   // of the joggle across a body, rad
-constexpr double kTie = 1e-14;  // squared distances this close, relatively, are equal
-
 int count_positive(const Vec3& w) {
   return (w[0] > 0) + (w[1] > 0) + (w[2] > 0);
 }
@@ -319,7 +316,7 @@ class Search {
 
   // In the unit cube, the same for equal points and in no relation for others.
   Vec3 scatter(const Vec3& g) const {
-    const Vec3 x = (kWaves / pair_.reach) * g;
+    const Vec3 x = (kJoggleWaves / pair_.reach) * g;
     return Vec3(std::sin(x[1] + 0.7 * x[2]), std::sin(x[2] + 0.6 * x[0]), std::sin(x[0] + 0.8 * x[1]));
   }
 

@@ -1,5 +1,8 @@
-// Every tolerance and cap of the support mapping and the contact search, with its scale and reason. Lengths
-// are relative to a body's bounding radius unless said otherwise; slopes and angles are in radians.
+// Every tolerance and cap of the making of bodies, the support mapping and the contact search, with its scale
+// and reason, in the order they are met. Lengths are relative to a body's bounding radius unless said
+// otherwise; slopes and angles are in radians, parameters in units of a patch's range.
+//
+// Elsewhere: what a paper's method asks for (reference/), fits (shapes/surface_fit.cpp), rotation (motion/).
 #pragma once
 
 namespace nurbs {
@@ -7,22 +10,74 @@ namespace nurbs {
 // Round-off of one support evaluation: a few ulp of the bounding radius.
 constexpr double kRoundoff = 8e-16;
 
+// --- a closed body
+constexpr double kJoinTolerance = 1e-6;       // of the box's diagonal: gap between edges that count as joined
+constexpr int kEdgeSamples = 5;               // points at which two edge curves are first compared
+constexpr int kProjectionSamples = 32;        // starts of the search for the closest point of a curve ...
+constexpr int kProjectionSections = 45;       // ... then golden sections: 1/16 of the parameter to 3e-11
+constexpr double kParameterRoundoff = 1e-12;  // a parameter that moves less has been found
+constexpr int kKinkSamples = 17;              // points at which the normals of two sides are compared
+constexpr double kPoleInset = 1e-4;           // parameters from a pole at which its normals are compared
+constexpr double kLeastVolume = 1e-12;        // of the diagonal cubed: less is no body but a surface
+
 // --- joints
-// ----------------------------------------------------------------------------------------------------
-constexpr double kNoKink = 1e-7;  // angles between normals below this are no kink: the ball argument then
-                                  // errs by less than kink^2 of the radius, which is round-off
+constexpr double kNoKink = 1e-7;      // angles between normals below this are no kink: the ball argument then
+                                      // errs by less than kink^2 of the radius, which is round-off
+constexpr double kSmoothKink = 1e-6;  // such bodies count as smooth: ignoring a kink moves a support by
+                                      // kink^2/8, 1e-13 of the radius
 constexpr double kSphere =
     1e-12;  // inner and bounding radius this close, relatively: a sphere, and treated as one
-constexpr int kSpeedSamples = 8;  // per parameter, of a patch's parametric speed
+constexpr int kSpeedSamples = 8;      // per parameter, of a patch's parametric speed
+constexpr double kSpeedSafety = 0.9;  // on the least speed seen at the samples
+
+// --- mass
+constexpr double kMomentTolerance = 1e-12;  // of each moment, per integration cell
+constexpr int kMaxHalvings = 10;            // of a cell; reached only at a singular patch corner
+constexpr double kMomentRoundoff = 1e-13;   // relative: products of inertia and differences of moments below
+                                            // this are none; integrated moments are good to some 1e-15
+constexpr double kGivenAsymmetry = 1e-12;   // relative, of a gyration tensor given by the user
+constexpr double kGivenExcess = 1e-9;       // by which its largest moment may exceed the sum of the others:
+                                            // a rod's or plate's, written with ten digits
+
+// --- radii
+constexpr double kBoundWidth = 1e-6;          // of the squared radius, at which a bound is tight enough
+constexpr int kMaxSplits = 4000;              // of patches, on the way there
+constexpr double kBernsteinRoundoff = 1e-13;  // relative, of products and halvings of the coefficients
+
+// --- curvature
+constexpr int kSurfaceSamples = 3000;                // aimed at, over the body ...
+constexpr int kLeastPerEdge = 4, kMostPerEdge = 24;  // ... and per patch parameter
+constexpr double kSingularCross = 5e-5;  // |Su x Sv| over the middle's |Su| |Sv|: below, a point is singular.
+                                         // Curvature loses the square of it in digits: about eight remain
+constexpr double kInsets[] = {1e-4, 1e-3};  // parameters towards the middle, in turn, where it is looked at
+                                            // instead
+constexpr int kPatternRounds = 14;    // halvings of the grid step in the search for the largest curvature
+constexpr double kChangeShare = 0.1;  // by which that is widened: of its change over a grid step ...
+constexpr double kCurvatureMargin = 1e-6;  // ... and of itself
+constexpr double kCurvatureNoise = 1e-9;   // over the bounding radius: curvatures up to this are round-off
+constexpr double kRateInset = 1e-3;        // parameters from the edges, of the samples of its rate of change:
+                                           // at a pole the form is singular
+constexpr int kRateSamples = 12;           // per patch parameter
+constexpr double kRateSafety = 2;          // on the largest rate seen between samples
+
+// --- dents
+constexpr double kAllowedDent = 1e-3;      // deeper is no convex body; up to this, a dent is left to the hull
+constexpr double kUnmentionedDent = 1e-6;  // deeper is worth a warning
+constexpr double kNoDent = 1e-13;          // round-off of a difference of supports
+constexpr int kPairsIfConvex = 1200, kPairsIfDented = 4000;  // samples compared with each other
+constexpr int kDentStarts = 1000;         // samples from which the best start of a support is taken
+constexpr int kTiltSections = 24;         // golden sections per direction in the search for the hull's plane
+constexpr double kWidestTilt = 2;         // tangent of the largest tilt of that plane against the surface
+constexpr int kMostCuts = 30;             // supports spent on one depth ...
+constexpr double kDepthTolerance = 1e-3;  // ... or until it is known to this, relatively
+constexpr int kPlaceRounds = 5;           // halvings of the sample step in the search for the deepest point
 
 // --- direction atlas
-// -------------------------------------------------------------------------------------------
 constexpr int kAtlasCells =
     16;  // per cube edge: the bound h is then loose by about (1/16)^2/8 of the curvature radius
 constexpr int kAtlasSamples = 4;  // per patch and direction, to start the first searches from
 
 // --- normal map
-// -------------------------------------------------------------------------------------------
 constexpr int kNormalCells = 64;           // per cube edge: cells 0.01 to 0.03 rad wide
 constexpr double kNormalMargin = 0.01;     // rad around a normal for which the map's promise holds
 constexpr double kLongRadius = 4;          // bounding radii
@@ -31,9 +86,12 @@ constexpr int kNormalDepth = 5;            // ... halved so often where normals 
 constexpr double kNormalQuadAngle = 0.02;  // ... by more than this, rad, or curvature radii ...
 constexpr double kEvenRadius = 1.5;        // ... by more than this factor
 constexpr int kNormalJointSamples = 64;    // along a kinked joint
+constexpr double kNormalCap = 0.2;         // widest cap of directions painted, rad
+constexpr double kRadiusSafety = 1.1;      // on the largest radius seen in a quad
+constexpr double kCapSafety = 1.2;         // on the angle between its normals; 1.5 across a joint, whose
+constexpr double kJointCapSafety = 1.5;    // sides meet at an angle that varies along it
 
 // --- support mapping
-// -------------------------------------------------------------------------------------------
 constexpr int kSupportIterations = 60;  // 3 to 5 are usual; hops between patches count too
 constexpr int kPolarRestarts = 4;       // times a search may leave a pole
 constexpr double kSlopeTolerance =
@@ -47,17 +105,21 @@ constexpr double kPoleOffset =
     1e-7;  // nearer to a pole than this (relative speed of the parameters) normals are lost
 constexpr double kPoleNormal =
     1e-8;  // the same where the limit of the normal is at hand, which errs by as much
-constexpr double kFlatHessian = 1e-12;  // Hessian determinants below this (times 1e-12) count as singular
+constexpr double kFlatCurvature = 1e-12;   // over the bounding radius: a curvature below this says nothing
+                                           // about how far to step
+constexpr double kSingularMetric = 1e-24;  // square of the sine of the angle between the tangents, below
+                                           // which only one of them is used
+constexpr double kSamePole = 1e-9;         // collapsed edges closer than this are one pole
+constexpr double kPoleRestart = 0.25;      // parameters from the pole at which a search is taken up, at most
+constexpr int kStepHalvings = 40;          // of a step that does not ascend: 1e-12 of it is left
 
 // --- certificate
-// --------------------------------------------------------------------------------------------------
 constexpr double kLeastTolerance =
     6 * kRoundoff;  // of the larger radius: no bracket of the gap can be narrower
 constexpr double kNoDirection =
     1e-10;  // a vector shorter than this, relative to the larger body, is mostly round-off
 
 // --- joint Newton
-// ----------------------------------------------------------------------------------------------
 constexpr double kSingular = 1e-13;  // 2 x 2 determinant over the sum of its products' sizes
 constexpr double kStationary =
     1e-10;  // angle between the normals, and offset across them over the smaller radius
@@ -69,15 +131,11 @@ constexpr int kWarmIterations = 4;     // 1 or 2 are usual
 constexpr int kPolishIterations = 12;  // from a cold start
 
 // --- local model
-// ------------------------------------------------------------------------------------------------
-constexpr int kRateSamples = 12;   // per patch parameter, of the inverse Weingarten map's rate of change
-constexpr double kRateSafety = 2;  // on the largest rate seen between samples
 constexpr double kRemainderSafety = 1.5;  // on the third-order remainder, for the fourth-order terms left out
 constexpr double kLocalDrift = 20;        // of the tolerance that the contact points may be off
 constexpr double kRoomShare = 0.5;  // of the distance to the patch's edges that the contact point may move
 
 // --- polytope method
-// -------------------------------------------------------------------------------------------
 constexpr int kHullVertices = 512;   // support pairs a fallback may spend; 20 to 80 are usual
 constexpr int kHullFaces = 2048;     // twice the vertices, and room for those being replaced
 constexpr int kHullAttempts = 5;     // from other directions, when round-off broke the hull
@@ -89,10 +147,11 @@ constexpr double kWidestRing = 0.5;  // rad
 constexpr double kSliver = 1e-13;  // triangles of the hull lower than this, relative to the larger body, have
                                    // no normal of their own
 constexpr double kJoggle = 1e-11;  // the second hull's vertices move by this, relative to the larger body
-constexpr double kFarAway = 1e300;  // larger than any length
+constexpr double kJoggleWaves = 37;  // of it across a body, rad
+constexpr double kTie = 1e-14;       // squared distances this close, relatively, are equal
+constexpr double kFarAway = 1e300;   // larger than any length
 
 // --- direction search (cold start)
-// -------------------------------------------------------------------------------
 constexpr int kScanCells = 4;       // per cube edge: 96 directions, 0.4 rad apart
 constexpr int kScanMoves = 6;       // of the compass search per stride
 constexpr double kDistinct = 0.75;  // cosine above which two guesses are in one basin

@@ -26,9 +26,9 @@ constexpr double kNearestParallel = 1e-3;
 constexpr double kNearestTouching = 1e-4;
 
 constexpr double kFirstAngleRadius = 0.5, kMaxAngleRadius = 1.0, kSmallestAngleRadius = 1e-11;  // rad
-constexpr double kMinSinPhi = 0.5;   // below it the chart is changed
-constexpr double kHeldSlope = 1e-8;  // rad: an edge parameter with a larger slope is held by a crease
-constexpr double kRoundOff = 1e-14;  // of the size: the tangential gap can't be made smaller
+constexpr double kMinSinPhi = 0.5;       // below it the chart is changed
+constexpr double kHeldSlope = 1e-8;      // rad: an edge parameter with a larger slope is held by a crease
+constexpr double kSlipRoundoff = 1e-14;  // of the extent: the tangential gap can't be made smaller
 
 // Two placed bodies: B's frame seen from A's.
 struct PlacedPair {
@@ -207,7 +207,7 @@ void minimise_f2(const PlacedPair& pair, AtDirection& at, double goal, int& iter
     if (!(length > 0)) return;
     const Vec3 d = chart.direction(angles + trial.step).d;
     const AtDirection next = look_along(pair, d, at.on_a, at.on_b);
-    const double noise = kRoundOff * pair.extent * at.g.norm();  // of f2
+    const double noise = kSlipRoundoff * pair.extent * at.g.norm();  // of f2
     moved = region.accept(at.f2() - next.f2(), trial.predicted, trial.on_boundary, length, noise);
     // Where f2 is all round-off, the slip still tells better from worse.
     if (moved && trial.predicted <= noise && next.slip.norm() >= at.slip.norm()) return;
@@ -271,7 +271,7 @@ ContactResult solve_cso(const Particle& a, const Particle& b, double tolerance, 
   // The slip is first order in the error of d, the gap second order: a slip of tolerance * size leaves normal
   // and points good to about the tolerance and the gap to its square. When round-off stops the search
   // earlier, a slip that still leaves the gap a thousandfold better than the tolerance counts as converged.
-  const double goal = std::max(tolerance * pair.size, kRoundOff * pair.extent);
+  const double goal = std::max(tolerance * pair.size, kSlipRoundoff * pair.extent);
   const double accept = std::max(goal, 1e-3 * std::sqrt(tolerance) * pair.size);
   Rung rung = warm ? Rung::warm : Rung::cold;
   for (int round = 0; round < kMaxRounds; ++round) {
