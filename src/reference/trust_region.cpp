@@ -1,73 +1,20 @@
 // The trust-region subproblem solved in the eigenbasis of the Hessian, and the radius rule.
 #include "reference/trust_region.h"
 
+#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <utility>
 
 namespace nurbs {
 namespace {
 
 constexpr int kMaxSecularIterations = 60;
-constexpr int kMaxJacobiSweeps = 20;  // 4 to 6 are usual
 constexpr double kEpsilon = std::numeric_limits<double>::epsilon();
 
 // Below this ratio of actual to predicted reduction the region shrinks, above the other it may grow; a step
 // is taken above kTake. The customary values of Nocedal & Wright algorithm 4.1.
 constexpr double kShrinkBelow = 0.25, kGrowAbove = 0.75, kTake = 0.1;
-
-template <int N>
-struct EigenBasis {
-  Eigen::Matrix<double, N, 1> values;   // ascending
-  Eigen::Matrix<double, N, N> vectors;  // columns
-};
-
-// Turns the (p, q) plane so that h(p, q) vanishes (Golub & Van Loan, Matrix Computations, section 8.5).
-template <int N>
-void jacobi_rotation(Eigen::Matrix<double, N, N>& h, Eigen::Matrix<double, N, N>& vectors, int p, int q) {
-  const double theta = (h(q, q) - h(p, p)) / (2 * h(p, q));
-  const double t = std::copysign(1 / (std::abs(theta) + std::hypot(1.0, theta)), theta);
-  const double c = 1 / std::hypot(1.0, t), s = c * t;
-  for (int k = 0; k < N; ++k) {
-    const double hp = h(k, p), hq = h(k, q), vp = vectors(k, p), vq = vectors(k, q);
-    h(k, p) = c * hp - s * hq;
-    h(k, q) = s * hp + c * hq;
-    vectors(k, p) = c * vp - s * vq;
-    vectors(k, q) = s * vp + c * vq;
-  }
-  for (int k = 0; k < N; ++k) {
-    const double hp = h(p, k), hq = h(q, k);
-    h(p, k) = c * hp - s * hq;
-    h(q, k) = s * hp + c * hq;
-  }
-}
-
-// Eigenvalues and vectors of a symmetric matrix by cyclic Jacobi rotations: for two to four variables as fast
-// as any method, and accurate to round-off of the largest eigenvalue.
-template <int N>
-EigenBasis<N> eigen_basis(Eigen::Matrix<double, N, N> h) {
-  EigenBasis<N> basis;
-  basis.vectors.setIdentity();
-  for (int sweep = 0; sweep < kMaxJacobiSweeps; ++sweep) {
-    bool diagonal = true;
-    for (int p = 0; p < N; ++p)
-      for (int q = p + 1; q < N; ++q) {
-        if (std::abs(h(p, q)) <= 0.1 * kEpsilon * (std::abs(h(p, p)) + std::abs(h(q, q)))) continue;
-        jacobi_rotation<N>(h, basis.vectors, p, q);
-        diagonal = false;
-      }
-    if (diagonal) break;
-  }
-  basis.values = h.diagonal();
-  for (int i = 0; i < N; ++i)
-    for (int j = i + 1; j < N; ++j)
-      if (basis.values[j] < basis.values[i]) {
-        std::swap(basis.values[i], basis.values[j]);
-        basis.vectors.col(i).swap(basis.vectors.col(j));
-      }
-  return basis;
-}
 
 // s_i = -gamma_i / (lambda_i + mu), components whose denominator vanishes left at zero (their gamma is zero
 // too, or the caller makes up for them with the hard case).
@@ -109,9 +56,9 @@ TrustRegionStep<N> solve_trust_region(const Eigen::Matrix<double, N, 1>& gradien
                                       const Eigen::Matrix<double, N, N>& hessian, double radius) {
   TrustRegionStep<N> result;
   if (!gradient.allFinite() || !hessian.allFinite() || !(radius > 0)) return result;
-  const EigenBasis<N> basis = eigen_basis<N>(hessian);
-  const Eigen::Matrix<double, N, 1>& lambda = basis.values;
-  const Eigen::Matrix<double, N, 1> gamma = basis.vectors.transpose() * gradient;
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix<double, N, N>> basis(hessian);
+  const Eigen::Matrix<double, N, 1>& lambda = basis.eigenvalues();  // ascending
+  const Eigen::Matrix<double, N, 1> gamma = basis.eigenvectors().transpose() * gradient;
   const double floor = 4 * kEpsilon * lambda.cwiseAbs().maxCoeff();
 
   Eigen::Matrix<double, N, 1> s = shifted_newton<N>(gamma, lambda, 0, floor);
@@ -132,7 +79,7 @@ TrustRegionStep<N> solve_trust_region(const Eigen::Matrix<double, N, 1>& gradien
       if (s.norm() > radius) s *= radius / s.norm();
     }
   }
-  result.step = basis.vectors * s;
+  result.step = basis.eigenvectors() * s;
   result.predicted = std::max(0.0, -gamma.dot(s) - 0.5 * s.dot(lambda.cwiseProduct(s)));
   return result;
 }
