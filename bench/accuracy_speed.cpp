@@ -14,7 +14,7 @@
 #include "bench/competitors.h"
 #include "bench/machine.h"
 #include "bench/reference.h"
-#include "tests/core/ellipsoid_oracle.h"
+#include "support/ellipsoid_oracle.h"
 
 namespace nurbs::bench {
 namespace {

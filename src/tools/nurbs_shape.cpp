@@ -1,6 +1,7 @@
 // nurbs-shape: makes, describes and checks shape files.
 #include <unistd.h>
 
+#include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cerrno>
 #include <charconv>
@@ -9,11 +10,10 @@
 #include <cstring>
 #include <exception>
 #include <fstream>
-#include <functional>
 #include <map>
+#include <memory>
 #include <stdexcept>
 #include <string>
-#include <utility>
 #include <vector>
 
 #include "body/shape.h"
@@ -26,40 +26,36 @@ namespace {
 using namespace nurbs;
 using Surfaces = std::vector<NurbsSurface>;
 
-constexpr char kUsage[] =
-    "usage: nurbs-shape make KIND [options] -o FILE   make a shape file; FILE alone, without -o, does too\n"
-    "       nurbs-shape info FILE                     describe a shape\n"
-    "       nurbs-shape check FILE                    exit 0 if FILE is a usable shape, 1 with the reason if "
-    "not\n"
-    "       nurbs-shape [COMMAND] --help\n";
+constexpr char kExamples[] =
+    "Examples:\n"
+    "  nurbs-shape make ellipsoid --axes 0.012,0.008,0.006 -o ellipsoid.json\n"
+    "  nurbs-shape make superellipsoid --axes 1,1,2 --exponent 4 --spans 5 blocky.json\n"
+    "  nurbs-shape make inertia --inertia 1.0,0.9,0.8,-0.04,0.02,0.09 --mass 2 stone.json\n"
+    "  nurbs-shape info ellipsoid.json\n"
+    "  nurbs-shape check ellipsoid.json\n";
 
-constexpr char kMakeUsage[] =
-    "usage: nurbs-shape make KIND [options] -o FILE\n"
-    "       nurbs-shape make KIND [options] FILE\n"
-    "\n"
-    "  sphere            [--radius R]                            exact, six biquartic rational patches\n"
-    "  ellipsoid         --axes A,B,C                            exact, six biquartic rational patches\n"
-    "  fitted-ellipsoid  --axes A,B,C [--spans N]                six bicubic patches, joints nearly smooth\n"
-    "  smooth-ellipsoid  --axes A,B,C                            six bicubic patches, joints smooth\n"
-    "  pebble            [--radius R]                            asymmetric, six bicubic patches, joints "
-    "smooth\n"
-    "  superellipsoid    --axes A,B,C --exponent E [--spans N]   |x/A|^E + |y/B|^E + |z/C|^E = 1, fitted\n"
-    "  revolved          --equatorial A --polar C                exact, one rational patch, axis z\n"
-    "  box               --axes A,B,C                            six flat faces\n"
-    "  inertia           --inertia XX,YY,ZZ,XY,XZ,YZ and --mass M or --density D or both\n"
-    "                    near-ellipsoid of six bicubic patches whose uniform solid has this inertia tensor "
-    "about\n"
-    "                    its centre of mass, the origin (XY is the tensor's element, -sum of m x y)\n"
-    "\n"
-    "A, B, C are semi-axes (half edges of the box); N (1..12, default 1, superellipsoid 3) is the number of "
-    "spans of a\n"
-    "patch in each direction: more fit better, odd numbers dent flat faces less. Default radius: 1.\n"
-    "--inertia fixes shape and size with --mass; the density follows and is printed. With --density the mass "
-    "follows.\n"
-    "With both the mass is met and the density must agree to 0.1 %.\n";
+constexpr char kInertiaNotes[] =
+    "XY is the tensor's element, -sum of m x y. With --mass, shape and size are fixed and the density "
+    "follows and\n"
+    "is printed; with --density the mass follows; with both the mass is met and the density must agree to "
+    "0.1 %.";
 
 struct UsageError : std::runtime_error {
   using std::runtime_error::runtime_error;
+};
+
+// Help that begins with how a command is called.
+class Help : public CLI::Formatter {
+ public:
+  explicit Help(const std::string& usage) : usage_(usage) { column_width(26); }
+  std::string make_description(const CLI::App*) const override { return ""; }
+  std::string make_positionals(const CLI::App*) const override { return ""; }  // the usage names them
+  std::string make_usage(const CLI::App* app, std::string) const override {
+    return "usage: " + usage_ + "\n\n" + app->get_description() + "\n";
+  }
+
+ private:
+  std::string usage_;
 };
 
 std::string format(const char* pattern, double value) {
@@ -71,59 +67,49 @@ std::string format(const char* pattern, double value) {
 // --- Options
 // -------------------------------------------------------------------------------------------------
 
-// Options of one command, each used at most once and none unknown.
+struct Argument {
+  const char *name, *value, *about;
+};
+
+// The arguments of one kind of body, each used at most once and none unknown.
 class Options {
  public:
-  // Splits `arguments` into --NAME VALUE or --NAME=VALUE with NAME in `allowed`, "-o FILE" and at most one
-  // plain FILE, which means the same.
-  Options(std::string command, const std::vector<std::string>& allowed,
-          const std::vector<std::string>& arguments)
-      : command_(std::move(command)) {
-    std::string last;  // the option before, if it was not the file
-    for (size_t k = 0; k < arguments.size(); ++k) {
-      std::string name = arguments[k], value;
-      if (!is_option(name)) {
-        if (!last.empty() && is_number_like(name)) {
-          fail(last + " takes its numbers with commas and no blanks, as 1,2,3, and " + name +
-               " follows after a blank");
-        }
-        value = std::exchange(name, "-o");
-      } else {
-        const size_t equals = name.find('=');
-        if (equals != std::string::npos) value = name.substr(equals + 1);
-        name.resize(std::min(equals, name.size()));
-        if (name != "-o" && std::find(allowed.begin(), allowed.end(), name) == allowed.end()) {
-          std::string list;
-          for (const std::string& option : allowed) list += option + " ";
-          fail("unknown option " + name + "; allowed are " + list + "-o");
-        }
-        if (equals == std::string::npos) {
-          if (++k == arguments.size() || is_option(arguments[k])) fail(name + " needs a value");
-          value = arguments[k];
-        }
-      }
-      last = name == "-o" ? "" : name;
-      if (const auto [first, fresh] = values_.emplace(name, value); !fresh) {
-        if (name == "-o") fail("the output file is given twice: " + first->second + " and " + value);
-        fail(name + " is given twice");
-      }
-    }
+  Options(CLI::App* command, const std::vector<Argument>& allowed) : command_(command) {
+    command->allow_extras();
+    for (const Argument& a : allowed) add(a.name, a.value, a.about);
+    file_ = add("-o,FILE", "FILE", "shape file to write; with or without -o");
   }
 
-  std::string output() {
-    const auto file = find("-o");
-    if (!file || file->empty()) fail("no output file: add -o FILE");
-    return *file;
+  // What CLI11 leaves over or can't judge; throws UsageError.
+  void check() const {
+    for (const std::string& left : command_->remaining())
+      if (is_option(left))
+        fail("unknown option " + left.substr(0, left.find('=')) + "; allowed are " + allowed());
+    const std::vector<std::string> files = plain_and_output();
+    for (const std::string& file : files) {
+      if (!is_number_like(file)) continue;
+      fail(option_before_file() + " takes its numbers with commas and no blanks, as 1,2,3, and " + file +
+           " follows after a blank");
+    }
+    for (const CLI::Option* option : command_->get_options()) {
+      if (option == file_ || option->count() == 0) continue;
+      if (option->count() > 1) fail(option->get_name() + " is given twice");
+      if (is_option(option->results()[0])) fail(option->get_name() + " needs a value");
+    }
+    if (files.size() > 1) fail("the output file is given twice: " + files[0] + " and " + files[1]);
+    if (files.empty() || files[0].empty()) fail("no output file: add -o FILE");
   }
+
+  std::string output() const { return file_->results()[0]; }
 
   // Numbers separated by commas, all in [lo, hi].
-  std::vector<double> numbers(const std::string& name, size_t count, double lo, double hi) {
-    const auto text = find(name);
-    if (!text) fail(name + " is missing");
+  std::vector<double> numbers(const std::string& name, size_t count, double lo, double hi) const {
+    if (!has(name)) fail(name + " is missing");
+    const std::string& text = command_->get_option(name)->results()[0];
     std::vector<double> out;
-    for (size_t begin = 0; begin <= text->size();) {
-      const size_t end = std::min(text->find(',', begin), text->size());
-      out.push_back(number(name, text->substr(begin, end - begin), lo, hi));
+    for (size_t begin = 0; begin <= text.size();) {
+      const size_t end = std::min(text.find(',', begin), text.size());
+      out.push_back(number(name, text.substr(begin, end - begin), lo, hi));
       begin = end + 1;
     }
     if (out.size() != count) {
@@ -133,29 +119,31 @@ class Options {
     return out;
   }
 
-  double number(const std::string& name, double otherwise, double lo, double hi) {
+  double number(const std::string& name, double otherwise, double lo, double hi) const {
     return has(name) ? numbers(name, 1, lo, hi)[0] : otherwise;
   }
 
-  double positive(const std::string& name) { return numbers(name, 1, kLeast, kMost)[0]; }
-  double positive(const std::string& name, double otherwise) {
+  double positive(const std::string& name) const { return numbers(name, 1, kLeast, kMost)[0]; }
+  double positive(const std::string& name, double otherwise) const {
     return has(name) ? positive(name) : otherwise;
   }
 
-  Vec3 axes() {
+  Vec3 axes() const {
     const std::vector<double> a = numbers("--axes", 3, kLeast, kMost);
     return {a[0], a[1], a[2]};
   }
 
-  int spans(int otherwise) {
+  int spans(int otherwise) const {
     const double n = number("--spans", otherwise, 1, 12);
     if (n != std::floor(n)) fail("--spans must be a whole number in 1..12");
     return static_cast<int>(n);
   }
 
-  bool has(const std::string& name) const { return values_.count(name) > 0; }
+  bool has(const std::string& name) const { return command_->count(name) > 0; }
 
-  [[noreturn]] void fail(const std::string& what) const { throw UsageError(command_ + ": " + what); }
+  [[noreturn]] void fail(const std::string& what) const {
+    throw UsageError("make " + command_->get_name() + ": " + what);
+  }
 
   static constexpr double kLeast = 1e-150, kMost = 1e150;
 
@@ -168,9 +156,34 @@ class Options {
     return text.size() > 1 && text[0] == '-' && !is_number_like(text);
   }
 
-  const std::string* find(const std::string& name) const {
-    const auto found = values_.find(name);
-    return found == values_.end() ? nullptr : &found->second;
+  CLI::Option* add(const char* names, const char* value, const char* about) {
+    return command_
+        ->add_option(
+            names, [](const CLI::results_t&) { return true; }, about)
+        ->type_name(value)
+        ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
+  }
+
+  std::string allowed() const {
+    std::string list;
+    for (const CLI::Option* option : command_->get_options())
+      if (option != command_->get_help_ptr() && option != file_) list += option->get_name() + " ";
+    return list + "-o";
+  }
+
+  std::vector<std::string> plain_and_output() const {
+    std::vector<std::string> files = file_->results();
+    for (const std::string& left : command_->remaining()) files.push_back(left);
+    return files;
+  }
+
+  std::string option_before_file() const {
+    std::string name = file_->get_name();
+    for (const CLI::Option* option : command_->parse_order()) {
+      if (option == file_) break;
+      name = option->get_name();
+    }
+    return name;
   }
 
   double number(const std::string& name, const std::string& text, double lo, double hi) const {
@@ -186,8 +199,8 @@ class Options {
     return value;
   }
 
-  std::string command_;
-  std::map<std::string, std::string> values_;
+  CLI::App* command_;
+  CLI::Option* file_;
 };
 
 // --- make
@@ -202,37 +215,37 @@ std::string fit_note(double error) {
   return "largest distance from the exact surface " + format("%.3g", error);
 }
 
-Body make_sphere(Options& options) {
+Body make_sphere(const Options& options) {
   return {exact_ellipsoid(Vec3::Constant(options.positive("--radius", 1))), ""};
 }
 
-Body make_ellipsoid(Options& options) {
+Body make_ellipsoid(const Options& options) {
   return {exact_ellipsoid(options.axes()), ""};
 }
 
-Body make_box(Options& options) {
+Body make_box(const Options& options) {
   return {box(options.axes()), ""};
 }
 
-Body make_revolved(Options& options) {
+Body make_revolved(const Options& options) {
   const double equatorial = options.positive("--equatorial"), polar = options.positive("--polar");
   return {revolved_ellipsoid(equatorial, polar), ""};
 }
 
-Body make_fitted(Options& options) {
+Body make_fitted(const Options& options) {
   double error = 0;
   const Vec3 axes = options.axes();
   Surfaces surfaces = fitted_ellipsoid(axes, options.spans(1), &error);
   return {std::move(surfaces), fit_note(error)};
 }
 
-Body make_smooth(Options& options) {
+Body make_smooth(const Options& options) {
   double error = 0;
   Surfaces surfaces = smooth_ellipsoid(options.axes(), &error);
   return {std::move(surfaces), fit_note(error)};
 }
 
-Body make_superellipsoid(Options& options) {
+Body make_superellipsoid(const Options& options) {
   double error = 0;
   const Vec3 axes = options.axes();
   const double exponent = options.numbers("--exponent", 1, 2, 12)[0];
@@ -240,13 +253,13 @@ Body make_superellipsoid(Options& options) {
   return {std::move(surfaces), fit_note(error)};
 }
 
-Body make_pebble(Options& options) {
+Body make_pebble(const Options& options) {
   Surfaces surfaces = pebble();
   transform(surfaces, options.positive("--radius", 1) * Mat3::Identity(), Vec3::Zero());
   return {std::move(surfaces), ""};
 }
 
-Body make_inertia(Options& options) {
+Body make_inertia(const Options& options) {
   const std::vector<double> j = options.numbers("--inertia", 6, -Options::kMost, Options::kMost);
   Mat3 inertia;
   inertia << j[0], j[3], j[4], j[3], j[1], j[5], j[4], j[5], j[2];
@@ -272,21 +285,40 @@ Body make_inertia(Options& options) {
 }
 
 struct Maker {
-  std::vector<std::string> options;
-  std::function<Body(Options&)> make;
+  const char *kind, *about;
+  std::vector<Argument> options;
+  Body (*make)(const Options&);
+  const char* notes = "";
 };
 
-const std::map<std::string, Maker>& makers() {
-  static const std::map<std::string, Maker> kMakers = {
-      {"sphere", {{"--radius"}, make_sphere}},
-      {"ellipsoid", {{"--axes"}, make_ellipsoid}},
-      {"fitted-ellipsoid", {{"--axes", "--spans"}, make_fitted}},
-      {"smooth-ellipsoid", {{"--axes"}, make_smooth}},
-      {"pebble", {{"--radius"}, make_pebble}},
-      {"superellipsoid", {{"--axes", "--exponent", "--spans"}, make_superellipsoid}},
-      {"revolved", {{"--equatorial", "--polar"}, make_revolved}},
-      {"box", {{"--axes"}, make_box}},
-      {"inertia", {{"--inertia", "--mass", "--density"}, make_inertia}},
+const std::vector<Maker>& makers() {
+  static const Argument kRadius{"--radius", "R", "default 1"}, kAxes{"--axes", "A,B,C", "semi-axes"},
+      kSpans{"--spans", "N", "of a patch in each direction, 1 to 12, default 1: more fit better"};
+  static const std::vector<Maker> kMakers = {
+      {"sphere", "exact, six biquartic rational patches", {kRadius}, make_sphere},
+      {"ellipsoid", "exact, six biquartic rational patches", {kAxes}, make_ellipsoid},
+      {"fitted-ellipsoid", "six bicubic patches, joints nearly smooth", {kAxes, kSpans}, make_fitted},
+      {"smooth-ellipsoid", "six bicubic patches, joints smooth", {kAxes}, make_smooth},
+      {"pebble", "asymmetric, six bicubic patches, joints smooth", {kRadius}, make_pebble},
+      {"superellipsoid",
+       "|x/A|^E + |y/B|^E + |z/C|^E = 1, fitted",
+       {kAxes,
+        {"--exponent", "E", "2 to 12"},
+        {"--spans", "N",
+         "of a patch in each direction, 1 to 12, default 3: odd numbers dent flat faces less"}},
+       make_superellipsoid},
+      {"revolved",
+       "exact ellipsoid, one rational patch, axis z",
+       {{"--equatorial", "A", "semi-axis"}, {"--polar", "C", "semi-axis"}},
+       make_revolved},
+      {"box", "six flat faces", {{"--axes", "A,B,C", "half edges"}}, make_box},
+      {"inertia",
+       "near-ellipsoid of six bicubic patches with this inertia tensor about its centre of mass, the origin",
+       {{"--inertia", "XX,YY,ZZ,XY,XZ,YZ", "of the solid, about its centre of mass"},
+        {"--mass", "M", "this, or --density, or both"},
+        {"--density", "D", "of the uniform solid"}},
+       make_inertia,
+       kInertiaNotes},
   };
   return kMakers;
 }
@@ -308,15 +340,10 @@ void print_warnings(const std::vector<std::string>& warnings) {
   for (const std::string& warning : warnings) std::fprintf(stderr, "WARNING: %s\n", warning.c_str());
 }
 
-int make(std::vector<std::string> arguments) {
-  const auto found = makers().find(arguments[0]);
-  if (found == makers().end()) {
-    throw UsageError("make: unknown kind '" + arguments[0] + "'; see nurbs-shape make --help");
-  }
-  arguments.erase(arguments.begin());
-  Options options("make " + found->first, found->second.options, arguments);
+void make(const Maker& maker, const Options& options) {
+  options.check();
   const std::string file = options.output();
-  Body body = found->second.make(options);
+  Body body = maker.make(options);
   std::vector<std::string> warnings;
   const auto shape = make_shape(file, body.surfaces, std::nullopt, &warnings);
   write_whole(file, write_shape({std::move(body.surfaces), std::nullopt}));
@@ -324,7 +351,6 @@ int make(std::vector<std::string> arguments) {
   std::printf("%s: %zu patches, volume %.10g, bounding radius %.6g\n", file.c_str(), shape->surfaces.size(),
               shape->mass.volume, shape->bounding_radius);
   if (!body.note.empty()) std::printf("%s\n", body.note.c_str());
-  return 0;
 }
 
 // --- info, check
@@ -395,7 +421,7 @@ void print_form(const Shape& shape) {
   std::printf("memory             %.1f kB\n", static_cast<double>(memory(shape)) / 1024);
 }
 
-int info(const std::string& file) {
+void info(const std::string& file) {
   std::vector<std::string> warnings;
   const auto shape = read_shape_file(file, &warnings);
   print_warnings(warnings);
@@ -403,10 +429,9 @@ int info(const std::string& file) {
   print_surfaces(*shape);
   print_mass(*shape);
   print_form(*shape);
-  return 0;
 }
 
-int check(const std::string& file) {
+void check(const std::string& file) {
   std::vector<std::string> warnings;
   const auto shape = read_shape_file(file, &warnings);
   print_warnings(warnings);
@@ -414,34 +439,61 @@ int check(const std::string& file) {
   std::printf("%s: usable: closed, outward%s, %zu patches, worst kink %.3g degrees, concavity %.3g\n",
               file.c_str(), warnings.empty() ? ", convex" : "", shape->surfaces.size(),
               std::max(kinks.opening, kinks.closing), shape->concavity);
-  return 0;
 }
 
-int run(const std::vector<std::string>& arguments) {
-  if (arguments.empty()) throw UsageError("no command; see nurbs-shape --help");
-  const std::string& command = arguments[0];
-  const bool help = std::any_of(arguments.begin(), arguments.end(),
-                                [](const std::string& a) { return a == "--help" || a == "-h"; });
-  if (help) {
-    std::fputs(command == "make" ? kMakeUsage : kUsage, stdout);
-    return 0;
+// Sub-command `make`, with one of its own for every kind of body.
+CLI::App* add_make(CLI::App& app, std::vector<Options>& options) {
+  CLI::App* command = app.add_subcommand("make", "makes a shape file");
+  command->allow_extras();
+  command->formatter(std::make_shared<Help>(
+      "nurbs-shape make KIND [options] -o FILE\n       nurbs-shape make KIND [options] FILE"));
+  for (const Maker& maker : makers()) {
+    CLI::App* kind = command->add_subcommand(maker.kind, maker.about);
+    kind->formatter(
+        std::make_shared<Help>("nurbs-shape make " + std::string(maker.kind) + " [options] -o FILE"));
+    kind->footer(maker.notes);
+    options.emplace_back(kind, maker.options);
   }
-  if (command == "make") {
-    if (arguments.size() < 2) throw UsageError("make: no kind; see nurbs-shape make --help");
-    return make({arguments.begin() + 1, arguments.end()});
-  }
-  if (command == "info" || command == "check") {
-    if (arguments.size() != 2) throw UsageError(command + ": give one shape file");
-    return command == "info" ? info(arguments[1]) : check(arguments[1]);
-  }
-  throw UsageError("unknown command '" + command + "'; see nurbs-shape --help");
+  return command;
+}
+
+void run(CLI::App& app, int argc, char** argv) {
+  app.formatter(std::make_shared<Help>("nurbs-shape COMMAND .."));
+  app.footer(kExamples);
+  std::vector<Options> options;  // of makers(), in order
+  const CLI::App* maker = add_make(app, options);
+  std::string file;
+  const auto add_reader = [&](const std::string& name, const std::string& about) {
+    CLI::App* command = app.add_subcommand(name, about);
+    command->formatter(std::make_shared<Help>("nurbs-shape " + name + " FILE"));
+    command->add_option("FILE", file, "shape file")->required();
+    return command;
+  };
+  const CLI::App* describer = add_reader("info", "describes a shape");
+  const CLI::App* checker =
+      add_reader("check", "exits with 0 if the file is a usable shape, 1 with the reason if not");
+  app.parse(argc, argv);
+
+  if (describer->parsed()) return info(file);
+  if (checker->parsed()) return check(file);
+  if (!maker->parsed()) throw UsageError("no command; see nurbs-shape --help");
+  for (size_t k = 0; k < options.size(); ++k)
+    if (maker->got_subcommand(makers()[k].kind)) return make(makers()[k], options[k]);
+  const std::vector<std::string> left = maker->remaining();
+  throw UsageError("make: " + (left.empty() ? "no kind" : "unknown kind '" + left[0] + "'") +
+                   "; see nurbs-shape make --help");
 }
 
 }  // namespace
 
 int main(int argc, char** argv) {
+  CLI::App app("makes, describes and checks shape files", "nurbs-shape");
   try {
-    return run({argv + 1, argv + argc});
+    run(app, argc, argv);
+    return 0;
+  } catch (const CLI::CallForHelp&) {
+    std::fputs(app.help().c_str(), stdout);
+    return 0;
   } catch (const std::exception& error) {
     std::fprintf(stderr, "ERROR: %s\n", error.what());
     return 1;
