@@ -6,11 +6,12 @@
 #include <cstring>
 #include <vector>
 
-#include "bodies.h"
+#include "support/bodies.h"
+#include "support/random.h"
 #include "body/flat_faces.h"
 #include "contact/contact_polygon.h"
 #include "contact/pair_search.h"
-#include "flat_bodies.h"
+#include "support/flat_bodies.h"
 
 namespace {
 

@@ -7,10 +7,11 @@
 #include <string>
 #include <vector>
 
-#include "bodies.h"
+#include "support/bodies.h"
+#include "support/random.h"
 #include "body/flat_faces.h"
 #include "body/support.h"
-#include "flat_bodies.h"
+#include "support/flat_bodies.h"
 #include "nurbs/affine.h"
 
 namespace {

@@ -6,11 +6,12 @@
 #include <cmath>
 #include <vector>
 
-#include "bodies.h"
+#include "support/bodies.h"
+#include "support/random.h"
 #include "contact/contact_polygon.h"
 #include "contact/pair_memory.h"
 #include "contact/pair_search.h"
-#include "flat_bodies.h"
+#include "support/flat_bodies.h"
 #include "motion/rotation.h"
 
 namespace {
