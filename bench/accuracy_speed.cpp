@@ -1,5 +1,6 @@
-// The accuracy-speed chart's data: error in gap, normal and contact points against time per contact, for
-// every method and body, in one run. Usage: accuracy_speed OUT.csv [seconds per method and body, default 1].
+// The accuracy-speed chart's data: error in gap, normal, contact points and force against time per contact,
+// for every method and body, in one run. Usage: accuracy_speed OUT.csv [seconds per method and body, default
+// 1].
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
@@ -13,8 +14,8 @@
 #include "bench/bodies.h"
 #include "bench/competitors.h"
 #include "bench/machine.h"
-#include "bench/reference.h"
 #include "support/ellipsoid_oracle.h"
+#include "support/reference.h"
 
 namespace nurbs::bench {
 namespace {
@@ -74,6 +75,7 @@ struct Entry {
   std::vector<double> seconds;  // per contact, one per batch
   double spent = 0;
   std::vector<double> gap, normal, points;  // errors, relative or rad
+  std::vector<double> force;                // of kn overlap along the normal, relative to it
   int failed = 0;
   double model_error = 0;
 };
@@ -132,6 +134,7 @@ void measure_errors(const Scene& scene, Entry& e, const std::vector<Answer>& ans
       }
       e.gap.push_back(std::abs(x.gap - r.gap) / size);
       e.normal.push_back(angle_between(x.normal, r.normal));
+      e.force.push_back((std::min(x.gap, 0.0) * x.normal - r.gap * r.normal).norm() / std::abs(r.gap));
       e.points.push_back(std::max((x.point_a - r.point_a).norm(), (x.point_b - r.point_b).norm()) / size);
     }
 }
@@ -149,7 +152,7 @@ void write_rows(std::ofstream& out, const Scene& scene, std::vector<Entry>& entr
                           scene.body->name.c_str(), e.method->name().c_str(), e.setting, e.model_error,
                           e.gap.size(), e.failed, e.seconds.size(), 1e9 * quantile(e.seconds, 0.5),
                           1e9 * quantile(e.seconds, 0), 1e9 * quantile(e.seconds, 0.75));
-    for (const auto* x : {&e.gap, &e.normal, &e.points})
+    for (const auto* x : {&e.gap, &e.normal, &e.points, &e.force})
       n += std::snprintf(row + n, sizeof row - n, ",%.3e,%.3e,%.3e", quantile(*x, 0.5), quantile(*x, 0.95),
                          quantile(*x, 1));
     out << row << "\n" << std::flush;
@@ -187,7 +190,8 @@ int main(int argc, char** argv) {
   std::ofstream out(argv[1]);
   out << "# " << machine_name() << "\n"
       << "body,method,setting,model_error,contacts,failed,batches,ns,ns_best,ns_75,gap_median,gap_95,gap_max,"
-         "normal_median,normal_95,normal_max,points_median,points_95,points_max\n";
+         "normal_median,normal_95,normal_max,points_median,points_95,points_max,"
+         "force_median,force_95,force_max\n";
   for (const Body& body : smooth_bodies()) run_body(body, argc > 2 ? std::atof(argv[2]) : 1, out);
   return out ? 0 : 1;
 }

@@ -7,11 +7,14 @@
 
 #include "body/shape.h"
 #include "support/pairs.h"
+#include "support/reference.h"
 
 namespace nurbs::bench {
 
+using test::make_reference;
 using test::Pair;
 using test::Random;
+using test::Reference;
 
 struct Body {
   std::string name;   // as in the CSV files

@@ -1,6 +1,6 @@
 #!/usr/bin/python3
 """Draws the accuracy-speed charts: plot_accuracy_speed.py accuracy_speed.csv OUT_DIRECTORY
-One PNG for each of gap, normal and contact points; one panel per body; log-log, median error over time."""
+One PNG for each of gap, normal, contact points and force; one panel per body; log-log, median error over time."""
 import csv
 import os
 import sys
@@ -20,6 +20,7 @@ ERRORS = {
     "gap": "error of the gap / bounding radius",
     "normal": "error of the normal (rad)",
     "points": "error of the contact points / bounding radius",
+    "force": "error of the force kn overlap n / its size",
 }
 STYLES = [  # name of the family, how it is drawn
     ("ours-warm", dict(color="#c0392b", marker="o", label="ours, warm (1e-2 .. 1e-14)")),

@@ -43,7 +43,7 @@ enum class Solver { ladder, cso };
 
 struct ContactSettings {
   Solver solver = Solver::ladder;
-  double tolerance = 1e-9;  // error allowed in the gap, relative to the smaller bounding radius
+  double tolerance = 1e-9;  // of the gap over the smaller bounding radius, and of the force: pair_search.h
   // A pair proven further apart than this (length) needs no more: its gap is then a lower bound, its points
   // and normal are not set. The host asks 0: only contacts matter. Infinity asks for the full answer always.
   double reach = std::numeric_limits<double>::infinity();

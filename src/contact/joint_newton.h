@@ -24,8 +24,8 @@ struct JointSolution {
 // `on_a`, `on_b`; regular at g = 0. Stops as soon as the certificate's bracket is within `tolerance` (a
 // length), then spends the step already solved for on a second-order update of the points: their normals were
 // within sqrt(tolerance / size) of the answer's, the updated one is within about tolerance / size. Where the
-// update can't be trusted, one iteration more. Two second-derivative evaluations an iteration; gives up (converged = false) after `cap` iterations or where
-// the relative curvature is singular.
+// update can't be trusted, one iteration more. Two second-derivative evaluations an iteration; gives up
+// (converged = false) after `cap` iterations or where the relative curvature is singular.
 JointSolution solve_joint(const PairFrame& pair, const SurfacePoint& on_a, const SurfacePoint& on_b,
                           double tolerance, double enough, int cap);
 

@@ -13,8 +13,8 @@
 // quadratics over unit d is one 2 x 2 system; p at its solution d is wrong by what h is, and above its
 // minimum by what is left of the gradient:
 //     |error of the gap| <= (L_A t_A^3 + L_B t_B^3) / 6 + |grad p|^2 / (2 least eigenvalue of Hess p).
-// The normal, and with it the force, errs to first order in that gradient: by |grad p| / (least eigenvalue), in
-// which the maps' remainder (L_A t_A^2 + L_B t_B^2) / 2 is a bound, and a loose one (kRemainderShare).
+// The normal, and with it the force, errs to first order in that gradient: by |grad p| / (least eigenvalue),
+// in which the maps' remainder (L_A t_A^2 + L_B t_B^2) / 2 is a bound, and a loose one (kRemainderShare).
 #pragma once
 
 #include "contact/pair_frame.h"

@@ -77,12 +77,13 @@ template <class Real>
 NURBS_INLINE Mask<Real> serves(const LocalContactOf<Real>& c, const Real& unique, double tolerance,
                                const Real& size) {
   const Real allowed = tolerance * size;
-  return c.valid & (-c.gap <= unique) & (c.error <= 0.5 * tolerance * larger(magnitude(c.gap), kForceDepth * size)) &
+  return c.valid & (-c.gap <= unique) &
+         (c.error <= 0.5 * tolerance * larger(magnitude(c.gap), kForceDepth * size)) &
          (c.tilt2 <= tolerance * tolerance) & (c.drift <= kLocalDrift * allowed);
 }
 
-// Whether a model made now is worth its 50 ns: bodies that turn as they did since the last solve, at the worst
-// once more than the last model served, would be served at least once. `gap`: of the contact, a length.
+// Whether a model made now is worth its 50 ns: bodies that turn as they did since the last solve, at the
+// worst once more than the last model served, would be served at least once. `gap`: of the contact, a length.
 inline bool may_serve(double rate_a, double rate_b, double turned2_a, double turned2_b, double gap,
                       double tolerance, double size) {
   const double a2 = 0.25 * turned2_a, b2 = 0.25 * turned2_b;

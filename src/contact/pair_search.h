@@ -20,6 +20,14 @@ constexpr int kPairMemorySize = 54;
 // over, normal and contact points jump. Smooth bodies that overlap by less than the sum of their least
 // curvature radii have one minimum only.
 //
+// Accuracy, at `tolerance` t: the bracket of a converged gap is at most t times the smaller bounding radius
+// wide; that is proven. The force is better, by estimates that are no proofs: the normal is right to about t
+// rad, the overlap to about t times itself, or t times kForceDepth of the radius where it is shallower, hence
+// a force kn overlap or kn overlap^1.5 along the normal to about t of its size. Newton's last update squares
+// an angle of at most sqrt(t); the local model serves while what it left out says so. Not held to it:
+// contacts that only the polytope resolves, on flats, kinks and in deep overlap, and those next to a pole,
+// where normals are right to about sqrt(t).
+//
 // Deterministic: the result depends only on the arguments, and callers pass the particles in tag order.
 ContactResult find_contact(const Particle& a, const Particle& b, const ContactSettings& settings,
                            double* memory);

@@ -6,12 +6,12 @@
 #include <cstring>
 #include <vector>
 
-#include "support/bodies.h"
-#include "support/random.h"
 #include "body/flat_faces.h"
 #include "contact/contact_polygon.h"
 #include "contact/pair_search.h"
+#include "support/bodies.h"
 #include "support/flat_bodies.h"
+#include "support/random.h"
 
 namespace {
 

@@ -7,12 +7,12 @@
 #include <string>
 #include <vector>
 
-#include "support/bodies.h"
-#include "support/random.h"
 #include "body/flat_faces.h"
 #include "body/support.h"
-#include "support/flat_bodies.h"
 #include "nurbs/affine.h"
+#include "support/bodies.h"
+#include "support/flat_bodies.h"
+#include "support/random.h"
 
 namespace {
 

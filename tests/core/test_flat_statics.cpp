@@ -6,13 +6,13 @@
 #include <cmath>
 #include <vector>
 
-#include "support/bodies.h"
-#include "support/random.h"
 #include "contact/contact_polygon.h"
 #include "contact/pair_memory.h"
 #include "contact/pair_search.h"
-#include "support/flat_bodies.h"
 #include "motion/rotation.h"
+#include "support/bodies.h"
+#include "support/flat_bodies.h"
+#include "support/random.h"
 
 namespace {
 

@@ -253,5 +253,42 @@ TEST(Stages, equal_plane_contacts_one_by_one_nearly_at_rest) {
   compare(true, {test::sphere(), test::ellipsoid(), test::smooth_pebble()}, 1e-3, 1e-5);
 }
 
+// Frictionless forces of coarse tolerances against those of the finest, body by body.
+void compare_tolerances(bool wall, double speed) {
+  constexpr double kFew = 4;
+  const ContactCoefficients elastic{1e3, 0, 0, 0, 0};
+  for (const double tolerance : {1e-4, 1e-6, 1e-9}) {
+    Random random(9);
+    Heap heap(random, {test::sphere(), test::ellipsoid(), test::smooth_pebble()}, 25, wall ? 1.2 : 2.2);
+    heap.dt *= speed;
+    const auto pairs = wall ? with_wall(heap.count()) : all_pairs(heap.count());
+    Host coarse(elastic, pairs), fine(elastic, pairs);
+    int loaded = 0;
+    double worst = 0;
+    for (int step = 0; step < 100; ++step) {
+      heap.move();
+      coarse.compute(heap, settings(tolerance), step == 0);
+      fine.compute(heap, settings(1e-14), step == 0);
+      for (int i = 0; i < heap.count(); ++i) {
+        const auto a = coarse.stages.sum(i), b = fine.stages.sum(i);
+        if (!(b.normal > 0)) continue;
+        ++loaded;
+        const double size = b.normal + elastic.kn * kForceDepth;
+        const double error = (a.force - b.force).norm() / size;
+        worst = std::max(worst, error / tolerance);
+        ASSERT_LT(error, kFew * tolerance) << "step " << step << " body " << i << " of " << tolerance;
+      }
+    }
+    EXPECT_GT(loaded, 500);
+    testing::Test::RecordProperty("worst_" + std::to_string(tolerance), std::to_string(worst));
+  }
+}
+TEST(Stages, forces_are_right_to_the_tolerance) {
+  for (const double speed : {0.01, 0.1, 1.0}) compare_tolerances(false, speed);
+}
+TEST(Stages, wall_forces_are_right_to_the_tolerance) {
+  for (const double speed : {0.01, 0.1, 1.0}) compare_tolerances(true, speed);
+}
+
 }  // namespace
 }  // namespace nurbs

@@ -1,9 +1,9 @@
 // The answer that errors are measured against: a contact polished in long double with code of its own.
 #pragma once
 
-#include "bench/bodies.h"
+#include "support/pairs.h"
 
-namespace nurbs::bench {
+namespace nurbs::test {
 
 struct Reference {
   double gap = 0;
@@ -17,4 +17,4 @@ struct Reference {
 // global one is what the certificate says, not this function.
 Reference make_reference(const Pair& pair);
 
-}  // namespace nurbs::bench
+}  // namespace nurbs::test

@@ -1,5 +1,5 @@
 // Long-double evaluation of Bezier patches and Newton on a pair of contact points.
-#include "bench/reference.h"
+#include "support/reference.h"
 
 #include <Eigen/LU>
 #include <cmath>
@@ -7,7 +7,7 @@
 #include "contact/pair_memory.h"
 #include "contact/pair_search.h"
 
-namespace nurbs::bench {
+namespace nurbs::test {
 namespace {
 
 using Real = long double;
@@ -130,4 +130,4 @@ Reference make_reference(const Pair& pair) {
   return {gap, normal.cast<double>(), a.s.cast<double>(), b.s.cast<double>(), true};
 }
 
-}  // namespace nurbs::bench
+}  // namespace nurbs::test
