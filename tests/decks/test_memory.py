@@ -1,0 +1,67 @@
+#!/usr/bin/python3
+"""What a pair remembers belongs to its bodies as they are: a changed size between runs is seen, apart or touching, by
+pairs and walls, and one solver does not believe another's memory."""
+import sys
+import unittest
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).resolve().parent))
+import deck  # noqa: E402
+
+LAW = "kn 1e6 kt 5e5 mu 0.3"
+DECK = """
+units si
+newton off
+communicate single vel yes
+boundary f f f
+atom_style nurbs ball.json
+read_data balls.data
+neighbor 0.4 bin
+neigh_modify delay 0
+pair_style gran/nurbs
+pair_coeff * * {law}
+fix floor all wall/nurbs plane 0 0 0 0 0 1 {law}
+fix motion all nve/nurbs
+compute gaps all nurbs/local id1 id2 gap
+dump rows all local 1 rows.txt c_gaps[1] c_gaps[2] c_gaps[3]
+timestep 1e-6
+run 3
+{change}
+run 1
+"""
+
+
+class Size(unittest.TestCase):
+    def gaps(self, apart, height, change):
+        atoms = [(1, 1, 1, 1.0, 1000.0, 0.0, 0.0, height, 1.0, 0.0, 0.0, 0.0),
+                 (2, 1, 1, 1.0, 1000.0, apart, 0.0, height, 1.0, 0.0, 0.0, 0.0)]
+        files = {"ball.json": deck.shape_file("sphere", 1), "balls.data": deck.data_file(atoms)}
+        run = deck.run_ok(DECK.format(law=LAW, change=change), files=files)
+        last = run.read("rows.txt").split("ITEM: TIMESTEP")[-1].split("ITEM: ENTRIES")[-1].splitlines()[1:]
+        rows = [[float(word) for word in line.split()] for line in last if line.strip()]
+        return {(int(row[0]), int(row[1])): row[2] for row in rows}
+
+    def test_balls_that_grow_between_runs_touch(self):
+        gaps = self.gaps(2.06, 1.03, "set group all diameter 2.1")
+        self.assertAlmostEqual(gaps[(1, 2)], -0.04, delta=1e-6)
+        self.assertAlmostEqual(gaps[(1, 0)], -0.02, delta=1e-6)
+        self.assertAlmostEqual(gaps[(2, 0)], -0.02, delta=1e-6)
+
+    def test_contacts_follow_a_size_changed_between_runs(self):
+        for diameter in (2.05, 2.01):
+            gaps = self.gaps(1.99, 0.99, f"set group all diameter {diameter}")
+            self.assertAlmostEqual(gaps[(1, 2)], 1.99 - diameter, delta=1e-6)
+            self.assertAlmostEqual(gaps[(1, 0)], 0.99 - diameter / 2, delta=1e-6)
+
+    def test_balls_that_shrink_between_runs_part(self):
+        self.assertEqual(self.gaps(1.99, 0.99, "set group all diameter 1.9"), {})
+
+    def test_one_solver_after_another(self):
+        other = f"pair_style gran/nurbs solver cso\npair_coeff * * {LAW}\nrun 3\n" \
+                f"pair_style gran/nurbs\npair_coeff * * {LAW}"
+        gaps = self.gaps(1.99, 5.0, other)
+        self.assertAlmostEqual(gaps[(1, 2)], -0.01, delta=1e-5)
+
+
+if __name__ == "__main__":
+    unittest.main(verbosity=1)
