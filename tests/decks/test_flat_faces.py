@@ -1,5 +1,6 @@
 #!/usr/bin/python3
 """Flat faces: boxes and cylinders rest, stack, tip and slide as statics says, and the energy ledger closes."""
+import json
 import sys
 import unittest
 from pathlib import Path
@@ -69,7 +70,35 @@ def sunk(mass=MASS):
     return mass * G / 2e7
 
 
+def cylinder(radius, half):
+    """Shape file of a cylinder about z: a side and two caps, each a disc whose centre is a pole."""
+    r2 = float(np.sqrt(0.5))
+    circle = [(1, 0), (1, 1), (0, 1), (-1, 1), (-1, 0), (-1, -1), (0, -1), (1, -1), (1, 0)]
+    weights = [1.0 if k % 2 == 0 else r2 for k in range(9)]
+    knots = [0, 0, 0, 1, 1, 2, 2, 3, 3, 4, 4, 4]
+
+    def patch(rows):  # two rings of (radius, z)
+        points = [[r * x, r * y, z] for r, z in rows for x, y in circle]
+        return {"degree_u": 1, "degree_v": 2, "knotvector_u": [0, 0, 1, 1], "knotvector_v": knots, "size_u": 2,
+                "size_v": 9, "control_points": {"points": points, "weights": weights * 2}}
+
+    data = [patch([(radius, half), (radius, -half)]), patch([(0.0, half), (radius, half)]),
+            patch([(radius, -half), (0.0, -half)])]
+    return json.dumps({"shape": {"type": "surface", "count": 3, "data": data}})
+
+
 class Rest(unittest.TestCase):
+    def test_a_cylinder_lies_still_on_its_cap_and_on_its_side(self):
+        mass = DENSITY * np.pi * 0.4**2 * 0.6
+        for name, turn, height in (("cap", turned((1, 0.3, 0), 0.05), 0.3), ("side", turned((1, 0, 0), 90), 0.4)):
+            r = run([atom(1, (0, 0, height + 0.05), turn)], 120000, shape=cylinder(0.4, 0.3))
+            left = r.thermo["kinetic"][-1] / (mass * G * 0.05)
+            lost = r.thermo["led[3]"][-1] + r.thermo["led[4]"][-1]
+            print(f"    cylinder on its {name}: kinetic energy {left:.1e} of the fall's, contacts {r.thermo['st[8]'][-1]:.0f},"
+                  f" ledger {np.ptp(r.thermo['ledger']) / lost:.1e} of what is dissipated", flush=True)
+            self.assertLess(left, 1e-12)
+            self.assertLess(np.ptp(r.thermo["ledger"]), 1e-2 * lost)
+
     def test_a_dropped_box_lies_still(self):
         for axis, angle in (((1, 0, 0), 0), ((1, 2, 0), 3), ((3, 1, 1), 25)):
             r = run([atom(1, (0, 0, HALF[2] + 0.25), turned(axis, angle))], 80000)
