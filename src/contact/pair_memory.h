@@ -62,9 +62,10 @@ inline void remember_point(const SurfacePoint& now, PointMemory* m) {
 
 inline CoarsePoint coarse(const PointMemory& m) {
   constexpr double kSteps = 65535;
-  if (!(m.patch >= 0 && m.patch < kSteps)) return {65535, 0, 0};
-  return {static_cast<std::uint16_t>(m.patch), static_cast<std::uint16_t>(m.u * kSteps + 0.5),
-          static_cast<std::uint16_t>(m.v * kSteps + 0.5)};
+  const bool there = m.patch >= 0 && m.patch < kSteps && m.u >= 0 && m.u <= 1 && m.v >= 0 && m.v <= 1;
+  if (!there) return {65535, 0, 0};
+  const auto step = [](double x) { return static_cast<std::uint16_t>(std::floor(x * kSteps + 0.5)); };
+  return {static_cast<std::uint16_t>(m.patch), step(m.u), step(m.v)};
 }
 inline PointMemory fine(const CoarsePoint& c) {
   constexpr double kSteps = 65535;

@@ -21,8 +21,8 @@ inline BodyMotion motion_of(const BodyRecord& r) {
 struct alignas(64) ContactStages::Results {
   double gap[kBlock], lower[kBlock];
   double normal[3][kBlock], point[3][kBlock], offset[3][kBlock];  // point: midpoint of the two
-  double touching[kBlock];                                        // 1 or 0
-  double served[kBlock];
+  double touching[kBlock] = {};                                   // 1 or 0
+  double served[kBlock] = {};
 
   void set(int lane, const ContactResult& r, const Vec3& separation) {
     gap[lane] = r.gap;

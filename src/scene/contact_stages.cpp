@@ -610,7 +610,7 @@ EnergyLedger ContactStages::stored() const {
 
 std::size_t ContactStages::bytes() const {
   return pool_.bytes() + sums_.capacity() * sizeof(Accumulator) +
-         a_.capacity() * (2 * sizeof(int) + sizeof(PairProof*) + sizeof(double));
+         a_.capacity() * (2 * sizeof(int) + sizeof(void*) + sizeof(double));
 }
 
 }  // namespace nurbs
