@@ -8,14 +8,11 @@
 namespace nurbs {
 namespace {
 
-// Of its distance to 1 that a factor moves in a step: a corner that has come down flat is up to four times
-// too stiff. The spring energy that it gives up, or takes from the dampers' share, is booked; undamped
-// contacts only give.
+// Of its distance to 1 that a factor above it moves in a step: a corner that has come down flat is up to four
+// times too stiff, and the spring energy that it gives up is booked. A factor below 1 stays until the contact
+// opens: raising it would put energy in.
 constexpr double kRelaxation = 2e-3;
-
-bool relaxes(const ContactCoefficients& law, double factor) {
-  return factor > 1 || (factor < 1 && law.cn > 0);
-}
+constexpr double kStiffest = 8;  // factor or weight of a contact; four is what a corner needs
 
 BodyFrame frame_of(const BodyRecord& r, double scale, const Shape* shape) {
   BodyFrame f;
@@ -90,6 +87,7 @@ bool ContactStages::make_flat(ContactBlock& block, int lane, const Results& sing
   const PolygonState state = now(polygon, *step_.bodies, step_.wall, a, b);
   const double weight = block.field[kWeight][lane];
   polygon.factor = continuity_factor(0.5 * weight * overlap * overlap, polygon, state);
+  if (!(polygon.factor < kStiffest)) return false;
 
   ContactState old;
   block.get(lane, kStateField, kContactStateSize, &old);
@@ -146,8 +144,7 @@ bool ContactStages::serve_flat(ContactBlock& block, int lane) {
       return false;
     }
   }
-  if (!step_.setup && relaxes(step_.laws[block.law[lane]], flat.polygon.factor))
-    relax_factor(block, lane, flat, state);
+  if (!step_.setup && flat.polygon.factor > 1) relax_factor(block, lane, flat, state);
   counts_.value[ContactCounts::local_model] += share(a, b);
   run_flat(block, lane, flat, state);
   return true;
@@ -181,6 +178,9 @@ bool ContactStages::remake(ContactBlock& block, int lane, FlatContact& flat, Pol
   if (!made || polygon.count < 2) return false;
   polygon.factor = flat.polygon.factor;
   const PolygonState fresh = now(polygon, *step_.bodies, step_.wall, a, b);
+  // Springs may lose energy here, which is booked, but gain none.
+  const double held = stored_energy(flat.polygon, state), holds = stored_energy(polygon, fresh);
+  if (holds > held) polygon.factor *= held / holds;
   int source[kContactPoints];
   match(flat.polygon, state, polygon, fresh, source);
 
@@ -241,7 +241,9 @@ void ContactStages::leave_flat(ContactBlock& block, int lane, FlatContact& flat,
   if (overlap > 0) {
     const ContactCoefficients& all = step_.laws[block.law[lane]];
     const BodyMotion motion_a = motion_of(record(a)), motion_b = motion_of(record(b));
-    weight = 2 * stored_energy(flat.polygon, state) / (overlap * overlap);
+    const double held = stored_energy(flat.polygon, state);
+    weight = std::min(2 * held / (overlap * overlap), kStiffest);
+    book(all.kn * (held - 0.5 * weight * overlap * overlap), a, b);
     Vec3 spring = Vec3::Zero(), arm_a = Vec3::Zero(), arm_b = Vec3::Zero();
     double sum = 0, energy = 0;
     for (int k = 0; k < state.count; ++k) {
@@ -280,7 +282,7 @@ void ContactStages::relax_weight(ContactBlock& block, int lane, double gap) {
     weight = 1;
     return;
   }
-  if (!relaxes(step_.laws[block.law[lane]], weight)) return;
+  if (weight < 1) return;
   const double change = kRelaxation * (1 - weight);
   ContactState state;
   block.get(lane, kStateField, kContactStateSize, &state);
