@@ -136,6 +136,30 @@ class Rest(unittest.TestCase):
         self.assertAlmostEqual(top, 9 * HALF[2] - sum(MASS * n * G / kn for n in range(1, 6)), delta=1e-5)
 
 
+class Heap(unittest.TestCase):
+    def test_boxes_and_cylinders_fall_in_a_heap(self):
+        """Every kind of meeting at once: corners, edges, faces, rims; none may put energy in."""
+        random, atoms = np.random.default_rng(5), []
+        for k in range(36):
+            q = random.normal(size=4)
+            atoms.append((k + 1, 1, 1 + k % 2, 1.0, DENSITY, -1.6 + 1.6 * (k % 3), -1.6 + 1.6 * (k // 3 % 3),
+                          0.9 + 1.4 * (k // 9), *map(float, q / np.linalg.norm(q))))
+        walls = "\n".join(f"fix {name} all wall/nurbs plane {plane} {LAW}" for name, plane in
+                          (("west", "-2.5 0 0 1 0 0"), ("east", "2.5 0 0 -1 0 0"), ("south", "0 -2.5 0 0 1 0"),
+                           ("north", "0 2.5 0 0 -1 0")))
+        files = {"box.json": deck.shape_file("box", *HALF), "cylinder.json": cylinder(0.4, 0.3),
+                 "bodies.data": deck.data_file(atoms, (), ((-3, 3), (-3, 3), (-1, 8)))}
+        r = deck.run_ok(DECK.format(shapes="box.json cylinder.json", law=LAW, gravity="0 0 -1", dt=5e-5, steps=24000,
+                                    every=1000, before=walls), files=files)
+        ledger, lost = r.thermo["ledger"], r.thermo["led[3]"][-1] + r.thermo["led[4]"][-1]
+        print(f"    heap: ledger off by {np.ptp(ledger) / lost:.1e} of what is dissipated,"
+              f" at most {(ledger - ledger[0]).max() / lost:.1e} gained", flush=True)
+        self.assertEqual(len(r.dump("out.dump")[-1][1]["x"]), 36)
+        self.assertLess((ledger - ledger[0]).max(), 2e-2 * lost)
+        self.assertLess(np.ptp(ledger), 0.1 * lost)
+        self.assertTrue((np.diff(r.thermo["led[3]"]) > -1e-3 * lost).all())
+
+
 class Statics(unittest.TestCase):
     def test_tips_at_the_angle_of_statics(self):
         """Gravity leans about y, fast to a degree and a half before the brink, then by half a degree a second."""
