@@ -160,14 +160,9 @@ NURBS_INLINE void transpose(Wide (&m)[kWidth]) {
     m[k + 4] = __builtin_shufflevector(u[k], u[k + 4], 4, 5, 6, 7, 12, 13, 14, 15);
   }
 #else
-  const Wide even01 = __builtin_shufflevector(m[0], m[1], 0, 4, 2, 6);
-  const Wide odd01 = __builtin_shufflevector(m[0], m[1], 1, 5, 3, 7);
-  const Wide even23 = __builtin_shufflevector(m[2], m[3], 0, 4, 2, 6);
-  const Wide odd23 = __builtin_shufflevector(m[2], m[3], 1, 5, 3, 7);
-  m[0] = __builtin_shufflevector(even01, even23, 0, 1, 4, 5);
-  m[1] = __builtin_shufflevector(odd01, odd23, 0, 1, 4, 5);
-  m[2] = __builtin_shufflevector(even01, even23, 2, 3, 6, 7);
-  m[3] = __builtin_shufflevector(odd01, odd23, 2, 3, 6, 7);
+  Lane4 columns[4];
+  transpose({m[0], m[1], m[2], m[3]}, columns);
+  for (int k = 0; k < 4; ++k) m[k] = columns[k];
 #endif
 }
 

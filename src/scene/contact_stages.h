@@ -161,6 +161,9 @@ class ContactStages {
 
   // Flat faces, creases and ruled lines: flat_stage.cpp.
   bool may_be_flat(int a, int b) const;
+  bool find_polygon(int a, int b, const Vec3& normal, double overlap, double reach, const ContactPolygon* old,
+                    ContactPolygon* polygon) const;
+  void finish(const ContactCoefficients& law, int a, int b, const ContactState& state);
   bool make_flat(ContactBlock& block, int lane, const Results& single);
   bool serve_flat(ContactBlock& block, int lane);
   bool remake(ContactBlock& block, int lane, FlatContact& flat, PolygonState& state, double overlap);

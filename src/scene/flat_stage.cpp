@@ -72,18 +72,31 @@ static PolygonState now(const ContactPolygon& polygon, const Bodies& bodies, con
   return evaluate(polygon, a < 0 ? plane_frame(load(wall->x)) : frame(a), frame(b));
 }
 
+// The polygon of two bodies that touch, or of a body and the wall; false where they meet at a point.
+bool ContactStages::find_polygon(int a, int b, const Vec3& normal, double overlap, double reach,
+                                 const ContactPolygon* old, ContactPolygon* polygon) const {
+  const Particle body = step_.bodies->particle(b);
+  const bool made =
+      a < 0 ? make_plane_polygon(body, load(step_.wall->x), step_.wall_normal, reach, polygon)
+            : make_pair_polygon(step_.bodies->particle(a), body, normal, overlap, reach, old, polygon);
+  return made && polygon->count >= 2;
+}
+
+// Finishes the dissipation of a contact whose place others take.
+void ContactStages::finish(const ContactCoefficients& law, int a, int b, const ContactState& state) {
+  if (!step_.ledger) return;
+  EnergyLedger work;
+  finish_contact(law, motion_of(record(a)), motion_of(record(b)), step_.dt, state, work);
+  dissipated_.add(work, share(a, b));
+}
+
 // Tries to turn a touching contact into several. The springs keep their energy across the normal; what they
 // gain or lose along it is booked.
 bool ContactStages::make_flat(ContactBlock& block, int lane, const Results& single) {
   const int a = block.a[lane], b = block.b[lane];
   const double overlap = -single.gap[lane];
   ContactPolygon polygon;
-  const Particle body = step_.bodies->particle(b);
-  const bool made =
-      a < 0 ? make_plane_polygon(body, load(step_.wall->x), step_.wall_normal, kReach * overlap, &polygon)
-            : make_pair_polygon(step_.bodies->particle(a), body, single.normal_of(lane), overlap,
-                                kReach * overlap, nullptr, &polygon);
-  if (!made || polygon.count < 2) return false;
+  if (!find_polygon(a, b, single.normal_of(lane), overlap, kReach * overlap, nullptr, &polygon)) return false;
   const PolygonState state = now(polygon, *step_.bodies, step_.wall, a, b);
   const double weight = block.field[kWeight][lane];
   polygon.factor = continuity_factor(0.5 * weight * overlap * overlap, polygon, state);
@@ -99,9 +112,7 @@ bool ContactStages::make_flat(ContactBlock& block, int lane, const Results& sing
   if (old.active != 0) {
     const ContactCoefficients& all = step_.laws[block.law[lane]];
     const BodyMotion motion_a = motion_of(record(a)), motion_b = motion_of(record(b));
-    EnergyLedger work;
-    finish_contact(scaled(all, weight), motion_a, motion_b, step_.dt, old, work);
-    if (step_.ledger) dissipated_.add(work, share(a, b));
+    finish(scaled(all, weight), a, b, old);
     double energy = stored_energy(scaled(all, weight), old).tangential_spring;
     for (int k = 0; k < polygon.count; ++k) {
       const ContactCoefficients own = scaled(all, polygon.factor * polygon.weight[k]);
@@ -169,13 +180,8 @@ void ContactStages::relax_factor(const ContactBlock& block, int lane, FlatContac
 bool ContactStages::remake(ContactBlock& block, int lane, FlatContact& flat, PolygonState& state,
                            double overlap) {
   const int a = block.a[lane], b = block.b[lane];
-  const Particle body = step_.bodies->particle(b);
   ContactPolygon polygon;
-  const double reach = kKeptReach * overlap;
-  const bool made = a < 0 ? make_plane_polygon(body, load(step_.wall->x), step_.wall_normal, reach, &polygon)
-                          : make_pair_polygon(step_.bodies->particle(a), body, state.normal, overlap, reach,
-                                              &flat.polygon, &polygon);
-  if (!made || polygon.count < 2) return false;
+  if (!find_polygon(a, b, state.normal, overlap, kKeptReach * overlap, &flat.polygon, &polygon)) return false;
   polygon.factor = flat.polygon.factor;
   const PolygonState fresh = now(polygon, *step_.bodies, step_.wall, a, b);
   // Springs may lose energy here, which is booked, but gain none.
@@ -186,15 +192,13 @@ bool ContactStages::remake(ContactBlock& block, int lane, FlatContact& flat, Pol
 
   const ContactCoefficients& all = step_.laws[block.law[lane]];
   const BodyMotion motion_a = motion_of(record(a)), motion_b = motion_of(record(b));
-  double energy = all.kn * (stored_energy(flat.polygon, state) - stored_energy(polygon, fresh));
+  double energy = all.kn * (held - stored_energy(polygon, fresh));
   ContactState old[kBlock];
   for (int k = 0; k < kBlock; ++k) {
     flat.points.get(k, kStateField, kContactStateSize, &old[k]);
     if (k >= state.count || old[k].active == 0) continue;
     const ContactCoefficients own = coefficients(flat.points, k);
-    EnergyLedger work;
-    finish_contact(own, motion_a, motion_b, step_.dt, old[k], work);
-    if (step_.ledger) dissipated_.add(work, share(a, b));
+    finish(own, a, b, old[k]);
     energy += stored_energy(own, old[k]).tangential_spring;
   }
   for (int k = 0; k < kBlock; ++k) {
@@ -232,7 +236,7 @@ void ContactStages::run_flat(ContactBlock& block, int lane, FlatContact& flat, c
 }
 
 // Back to one contact, of the deepest point: it gets the springs' mean, weighted, and a weight that keeps the
-// energy; what the springs across the normal had besides is lost to friction.
+// energy; what its springs hold less than the polygon's did is booked.
 void ContactStages::leave_flat(ContactBlock& block, int lane, FlatContact& flat, const PolygonState& state,
                                double overlap) {
   const int a = block.a[lane], b = block.b[lane];
@@ -251,9 +255,7 @@ void ContactStages::leave_flat(ContactBlock& block, int lane, FlatContact& flat,
       flat.points.get(k, kStateField, kContactStateSize, &point);
       const ContactCoefficients own = coefficients(flat.points, k);
       if (point.active != 0) {
-        EnergyLedger work;
-        finish_contact(own, motion_a, motion_b, step_.dt, point, work);
-        if (step_.ledger) dissipated_.add(work, share(a, b));
+        finish(own, a, b, point);
         energy += stored_energy(own, point).tangential_spring;
       }
       const double load_of = std::max(0.0, -state.gap[k]) * flat.polygon.weight[k];
