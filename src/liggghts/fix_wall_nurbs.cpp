@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdlib>
 #include <cstring>
 
 #include "atom.h"
@@ -31,7 +32,7 @@ constexpr int kPlaneArguments = 7;  // plane PX PY PZ NX NY NZ
 FixWallNurbs::FixWallNurbs(LAMMPS* lmp, int narg, char** arg) : Fix(lmp, narg, arg) {
   AtomVecNurbs::require(lmp, "Fix wall/nurbs");
   parse_plane(narg, arg);
-  law_ = nurbs_host::parse_coefficients(lmp, "Fix wall/nurbs", 3 + kPlaneArguments, narg, arg);
+  parse_law(3 + kPlaneArguments, narg, arg);
 
   scalar_flag = vector_flag = 1;
   size_vector = 6;
@@ -68,6 +69,26 @@ void FixWallNurbs::parse_plane(int narg, char** arg) {
   normal_ = normal / length;
 }
 
+void FixWallNurbs::parse_law(int first, int narg, char** arg) {
+  if (narg <= first || std::strcmp(arg[first], "type") != 0) {
+    if (nurbs_host::HostModels::named_by(narg - first, arg + first))
+      fail_all(FLERR, lmp,
+               std::string("Fix wall/nurbs: type T, the wall's atom type, must stand before ") + arg[first]);
+    law_ = nurbs_host::parse_coefficients(lmp, "Fix wall/nurbs", first, narg, arg);
+    return;
+  }
+  const std::string value = narg > first + 1 ? arg[first + 1] : "";
+  char* end = nullptr;
+  const long type = std::strtol(value.c_str(), &end, 10);
+  if (value.empty() || *end != '\0' || type < 1 || type > atom->ntypes)
+    fail_all(FLERR, lmp,
+             "Fix wall/nurbs: type = " + value + " must be an atom type, in [1, " +
+                 std::to_string(atom->ntypes) + "]");
+  models_ = std::make_unique<nurbs_host::HostModels>(lmp, "Fix wall/nurbs", static_cast<int>(type),
+                                                     narg - first - 2, arg + first + 2);
+  stages_.pool().set_memory_size(nurbs::kModelMemory + models_->history_size());
+}
+
 std::vector<FixWallNurbs*> FixWallNurbs::all(LAMMPS* lmp) {
   std::vector<FixWallNurbs*> walls;
   for (int k = 0; k < lmp->modify->nfix; ++k)
@@ -89,6 +110,7 @@ void FixWallNurbs::init() {
   comm->maxexchange_fix =
       std::max(comm->maxexchange_fix, walls * (nurbs::kProofSize + nurbs::kMostContactSize));
   ledger_ = nurbs_host::wants_ledger(lmp);
+  if (models_) models_->init();
   warn_periodic();
   warn_time_step();
 }
@@ -109,6 +131,7 @@ void FixWallNurbs::warn_periodic() {
 }
 
 void FixWallNurbs::warn_time_step() {
+  if (models_) return;  // fix check/timestep/gran has the say
   double mine = 1e300, lightest = 0;
   for (int i = 0; i < atom->nlocal; ++i)
     if (atom->mask[i] & groupbit) mine = std::min(mine, atom->rmass[i]);
@@ -153,6 +176,7 @@ void FixWallNurbs::post_force(int) {
   step.ledger = ledger_;
   step.settings = settings_;
   step.laws = &law_;
+  step.model = models_.get();
   stages_.compute(step);
   for (const int i : stages_.loaded()) {
     const nurbs::ContactStages::Sum sum = stages_.sum(i);

@@ -1,5 +1,8 @@
 // fix wall/nurbs: an immobile plane for NURBS particles, with the force law of pair gran/nurbs.
 //   fix ID group wall/nurbs plane PX PY PZ NX NY NZ kn KN kt KT [cn CN] [ct CT] mu MU
+// or with the host's contact models (host_models.h) and atom type T for the wall's material:
+//   fix ID group wall/nurbs plane PX PY PZ NX NY NZ type T [radius curvature|volume] model NORMAL [tangential
+//   T] ...
 // The normal points to the particles. Scalar: elastic energy. Vector: force of the particles on the wall
 // (1-3) and its torque about P (4-6).
 #ifdef FIX_CLASS
@@ -11,10 +14,12 @@ FixStyle(wall/nurbs,FixWallNurbs)
 #ifndef LMP_FIX_WALL_NURBS_H
 #define LMP_FIX_WALL_NURBS_H
 
+#include <memory>
 #include <string>
 #include <vector>
 
 #include "fix.h"
+#include "liggghts/host_models.h"
 #include "liggghts/nurbs_contact.h"
 
 namespace LAMMPS_NS {
@@ -50,18 +55,21 @@ class FixWallNurbs : public Fix {
 
   // This rank's share. Dissipation is counted while there is a compute nurbs/energy.
   nurbs::EnergyLedger energy() const { return stages_.stored().add(stages_.dissipated(), 1); }
+  const nurbs_host::HostModels* models() const { return models_.get(); }
   const nurbs_host::ContactCounts& counts() const { return stages_.counts(); }
   void append_rows(int groupbit, std::vector<nurbs_host::ContactRow>& rows) const;
 
  private:
   void parse_plane(int narg, char** arg);
+  void parse_law(int first, int narg, char** arg);
   nurbs::PairProof& proof(int i) const { return *reinterpret_cast<nurbs::PairProof*>(proofs_[i]); }
   void hand_in_neighbours();
   void warn_periodic();
   void warn_time_step();
 
   nurbs::Vec3 origin_ = nurbs::Vec3::Zero(), normal_ = nurbs::Vec3::UnitZ();
-  nurbs::ContactCoefficients law_;
+  nurbs::ContactCoefficients law_;                  // or ...
+  std::unique_ptr<nurbs_host::HostModels> models_;  // ... the host's models
   nurbs::ContactSettings settings_ = nurbs_host::contacts_only();
   AtomVecNurbs* bodies_ = nullptr;
   int freeze_groupbit_ = 0;

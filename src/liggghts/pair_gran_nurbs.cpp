@@ -57,11 +57,17 @@ PairGranNurbs* PairGranNurbs::find(LAMMPS* lmp) {
 
 void PairGranNurbs::settings(int narg, char** arg) {
   settings_ = nurbs_host::contacts_only();
+  std::unique_ptr<nurbs_host::HostModels> models;
   for (int k = 0; k < narg; k += 2) {
     const std::string keyword = arg[k];
+    if (nurbs_host::HostModels::named_by(narg - k, arg + k)) {
+      models = std::make_unique<nurbs_host::HostModels>(lmp, "Pair style gran/nurbs", 0, narg - k, arg + k);
+      break;
+    }
     if (keyword != "tolerance" && keyword != "solver")
       fail_all(FLERR, lmp,
-               "Pair style gran/nurbs: unknown keyword " + keyword + "; allowed are tolerance solver");
+               "Pair style gran/nurbs: unknown keyword " + keyword +
+                   "; allowed are tolerance solver radius model");
     if (k + 1 == narg) fail_all(FLERR, lmp, "Pair style gran/nurbs: keyword " + keyword + " needs a value");
     const std::string value = arg[k + 1];
     if (keyword == "tolerance") {
@@ -74,6 +80,17 @@ void PairGranNurbs::settings(int narg, char** arg) {
       fail_all(FLERR, lmp, "Pair style gran/nurbs: solver " + value + " must be default or cso");
     }
   }
+  set_models(std::move(models));
+}
+
+// Contacts keep their history if it is of the same models.
+void PairGranNurbs::set_models(std::unique_ptr<nurbs_host::HostModels> models) {
+  const std::string before = models_ ? models_->layout() : "", after = models ? models->layout() : "";
+  const bool same = (models_ != nullptr) == (models != nullptr) && before == after;
+  models_ = std::move(models);
+  if (same) return;
+  stages_.pool().clear();
+  stages_.pool().set_memory_size(models_ ? nurbs::kModelMemory + models_->history_size() : 0);
 }
 
 // The host stops at a type without coefficients before it asks the style, and doesn't say which pair. So its
@@ -93,6 +110,16 @@ void PairGranNurbs::coeff(int narg, char** arg) {
   force->bounds(arg[0], ntypes_, ilo, ihi);
   force->bounds(arg[1], ntypes_, jlo, jhi);
   const std::string user = std::string("Pair coeff ") + arg[0] + " " + arg[1];
+  if (models_) {
+    if (narg > 2)
+      fail_all(FLERR, lmp,
+               user + " " + arg[2] +
+                   ": with model .. the materials are those of fix property/global; "
+                   "write pair_coeff * *");
+    return;
+  }
+  if (narg == 2)
+    fail_all(FLERR, lmp, user + ": needs kn KN kt KT mu MU, or a pair_style gran/nurbs with model NORMAL ..");
   const ContactCoefficients given = nurbs_host::parse_coefficients(lmp, user, 2, narg, arg);
   bool any = false;
   for (int i = ilo; i <= ihi; ++i)
@@ -125,12 +152,18 @@ void PairGranNurbs::refuse_sphere_features() {
 }
 
 void PairGranNurbs::require_all_laws() {
+  if (models_) return;
   for (int i = 1; i <= ntypes_; ++i)
     for (int j = i; j <= ntypes_; ++j)
       if (!law(i, j))
         fail_all(
             FLERR, lmp,
             "Pair gran/nurbs: missing pair_coeff for types " + std::to_string(i) + " " + std::to_string(j));
+}
+
+// The host has just forgotten all materials.
+void PairGranNurbs::init_granular() {
+  if (models_) models_->init();
 }
 
 void PairGranNurbs::init_style() {
@@ -177,6 +210,7 @@ void PairGranNurbs::warn_time_step() {
   std::vector<double> mine(ntypes_ + 1, none), mass(ntypes_ + 1, none);
   for (int i = 0; i < atom->nlocal; ++i) mine[atom->type[i]] = std::min(mine[atom->type[i]], atom->rmass[i]);
   MPI_Allreduce(mine.data(), mass.data(), ntypes_ + 1, MPI_DOUBLE, MPI_MIN, world);
+  if (models_) return;  // fix check/timestep/gran has the say
   double shortest = none;
   int first = 0, second = 0;
   for (int i = 1; i <= ntypes_; ++i)
@@ -227,6 +261,7 @@ void PairGranNurbs::compute_force(int eflag, int vflag, int addflag) {
   step.types = atom->type;
   step.type_count = ntypes_ + 1;
   step.laws = law_table_.data();
+  step.model = models_.get();
   stages_.compute(step);
   add_forces();
   if (evflag || storeContactForces() || storeContactForcesStress())
@@ -269,13 +304,13 @@ void PairGranNurbs::tally(const nurbs::ContactView& contact) {
   const Vec3 force = force_on_b(state);
   double on_a[6], on_b[6];
   Vec3Map{on_a} = -force;
-  Vec3Map{on_a + 3} = -Eigen::Map<const Vec3>(state.arm_a).cross(force);
+  Vec3Map{on_a + 3} = -Eigen::Map<const Vec3>(state.arm_a).cross(force) - contact.torque;
   Vec3Map{on_b} = force;
-  Vec3Map{on_b + 3} = Eigen::Map<const Vec3>(state.arm_b).cross(force);
+  Vec3Map{on_b + 3} = Eigen::Map<const Vec3>(state.arm_b).cross(force) + contact.torque;
   if (evflag) {
     const Vec3 apart = Vec3Map(atom->x[contact.a]) - Vec3Map(atom->x[contact.b]);
-    ev_tally_xyz(contact.a, contact.b, atom->nlocal, 0, stored_energy(contact.law, state).elastic(), 0,
-                 on_a[0], on_a[1], on_a[2], apart.x(), apart.y(), apart.z());
+    ev_tally_xyz(contact.a, contact.b, atom->nlocal, 0, contact.stored.elastic(), 0, on_a[0], on_a[1],
+                 on_a[2], apart.x(), apart.y(), apart.z());
   }
   keep_contact_force(contact, on_a, on_b);
 }
@@ -309,7 +344,8 @@ void PairGranNurbs::report_contacts() {
     const int i = i_is_a ? contact.a : contact.b, j = i_is_a ? contact.b : contact.a;
     const Vec3 force = i_is_a ? Vec3(-force_on_b(state)) : force_on_b(state);
     const Vec3 arm(i_is_a ? state.arm_a : state.arm_b);
-    const Vec3 torque = arm.cross(force), point = Vec3Map(atom->x[i]) + arm;
+    const Vec3 torque = arm.cross(force) + (i_is_a ? -1 : 1) * contact.torque,
+               point = Vec3Map(atom->x[i]) + arm;
     double shown[nurbs::kProofSize];
     std::copy_n(state.normal, 3, shown);
     std::copy_n(state.spring, 3, shown + 3);
@@ -338,6 +374,10 @@ void PairGranNurbs::append_rows(int groupbit, std::vector<nurbs_host::ContactRow
 void PairGranNurbs::write_restart_settings(FILE* file) {
   const double values[] = {settings_.tolerance, static_cast<double>(settings_.solver)};
   std::fwrite(values, sizeof values, 1, file);
+  const std::string text = models_ ? models_->text() : "";
+  const int length = static_cast<int>(text.size());
+  std::fwrite(&length, sizeof length, 1, file);
+  std::fwrite(text.data(), 1, text.size(), file);
 }
 
 void PairGranNurbs::read_restart_settings(FILE* file, const int, const int) {
@@ -347,6 +387,17 @@ void PairGranNurbs::read_restart_settings(FILE* file, const int, const int) {
   MPI_Bcast(values, 2, MPI_DOUBLE, 0, world);
   settings_.tolerance = values[0];
   settings_.solver = static_cast<nurbs::Solver>(static_cast<int>(values[1]));
+  constexpr int kMostText = 10000;
+  int length = 0;
+  if (comm->me == 0 && (std::fread(&length, sizeof length, 1, file) != 1 || length < 0 || length > kMostText))
+    nurbs_host::fail_one(lmp, "Restart file is cut off in pair gran/nurbs");
+  MPI_Bcast(&length, 1, MPI_INT, 0, world);
+  std::string text(length, ' ');
+  if (comm->me == 0 && std::fread(text.data(), 1, text.size(), file) != text.size())
+    nurbs_host::fail_one(lmp, "Restart file is cut off in pair gran/nurbs");
+  MPI_Bcast(text.data(), length, MPI_CHAR, 0, world);
+  set_models(length == 0 ? nullptr
+                         : std::make_unique<nurbs_host::HostModels>(lmp, "Pair style gran/nurbs", 0, text));
 }
 
 void PairGranNurbs::write_restart(FILE* file) {

@@ -1,6 +1,9 @@
 // pair_style gran/nurbs: contact forces between NURBS particles.
 //   pair_style gran/nurbs [tolerance VALUE] [solver default|cso]
 //   pair_coeff I J kn KN kt KT [cn CN] [ct CT] mu MU
+// or with the host's own contact models and its materials (host_models.h):
+//   pair_style gran/nurbs [tolerance VALUE] [solver ..] [radius curvature|volume] model NORMAL [tangential T]
+//   ... pair_coeff * *
 // A PairGran, whose name contains "gran", so that host features made for granular pair styles find it.
 #ifdef PAIR_CLASS
 
@@ -11,10 +14,12 @@ PairStyle(gran/nurbs,PairGranNurbs)
 #ifndef LMP_PAIR_GRAN_NURBS_H
 #define LMP_PAIR_GRAN_NURBS_H
 
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
 
+#include "liggghts/host_models.h"
 #include "liggghts/nurbs_contact.h"
 #include "pair_gran.h"
 
@@ -30,6 +35,7 @@ class PairGranNurbs : public PairGran {
   void settings(int narg, char** arg) override;
   void coeff(int narg, char** arg) override;
   void init_style() override;
+  void init_granular() override;
   void reset_dt() override;
 
   void write_restart(FILE* file) override;
@@ -37,9 +43,14 @@ class PairGranNurbs : public PairGran {
   void write_restart_settings(FILE* file) override;
   void read_restart_settings(FILE* file, const int major, const int minor) override;
 
-  bool contact_match(const std::string, const std::string) override { return false; }
-  double stressStrainExponent() override { return 1; }
-  int64_t hashcode() override { return 0x4e5552425331; }
+  bool contact_match(const std::string kind, const std::string name) override {
+    return models_ != nullptr && models_->matches(kind, name);
+  }
+  double stressStrainExponent() override { return models_ ? models_->stress_strain_exponent() : 1; }
+  int64_t hashcode() override { return models_ ? models_->hashcode() : 0x4e5552425331; }
+
+  // The host's contact models, or nullptr where the linear law serves.
+  const nurbs_host::HostModels* models() const { return models_.get(); }
 
   const nurbs::ContactSettings& contact_settings() const { return settings_; }
   // This rank's share, a pair across two ranks counting half on each. Dissipation is counted while there is a
@@ -65,6 +76,7 @@ class PairGranNurbs : public PairGran {
   const Law& law(int itype, int jtype) const {
     return laws_[static_cast<size_t>(itype) * (ntypes_ + 1) + jtype];
   }
+  void set_models(std::unique_ptr<nurbs_host::HostModels> models);
   void allocate_laws();
   void require_host_settings();
   void refuse_sphere_features();
@@ -84,6 +96,7 @@ class PairGranNurbs : public PairGran {
   int ntypes_ = 0;
   std::vector<Law> laws_;
   std::vector<nurbs::ContactCoefficients> law_table_;  // laws_, all of them given
+  std::unique_ptr<nurbs_host::HostModels> models_;     // instead of these
   AtomVecNurbs* bodies_ = nullptr;
   nurbs::ContactStages stages_;
   bool ledger_ = false;

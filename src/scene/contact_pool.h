@@ -2,12 +2,16 @@
 // vectors. Only pairs that touch, or were not proven apart, own one.
 #pragma once
 
+#include <algorithm>
 #include <array>
+#include <cstdint>
 #include <cstring>
+#include <functional>
+#include <utility>
 
 #include "contact/contact_polygon.h"
 #include "contact/pair_memory.h"
-#include "laws/contact_law.h"
+#include "laws/contact_model.h"
 #include "scene/bodies.h"
 
 namespace nurbs {
@@ -63,7 +67,7 @@ struct FlatRecord {  // as it travels
   ContactState state[kBlock];
 };
 constexpr int kFlatSize = sizeof(FlatRecord) / sizeof(double);
-constexpr int kMostContactSize = kContactSize + kFlatSize;
+constexpr int kMostContactSize = kContactSize + kFlatSize + (1 + kBlock) * kMostModelMemory;
 static_assert(kContactPoints <= kBlock && sizeof(FlatRecord) % sizeof(double) == 0);
 
 // Contacts by number, from 1; 0 is none. Numbers stay until the contact is removed.
@@ -72,7 +76,37 @@ class ContactPool {
   std::int32_t add(const ContactRecord& record) {
     const std::int32_t number = take(blocks_, free_);
     block(number).set(lane(number), 0, kContactSize, &record);
+    if (memory_size_ != 0) {
+      memory_.resize(blocks_.size() * kBlock * memory_size_);
+      std::fill_n(memory(block(number), lane(number)), memory_size_, 0.0);
+    }
     return number;
+  }
+
+  // Doubles that a contact model keeps beside every contact and every point of a polygon, at most
+  // kMostModelMemory; none by default. To be said while there are no contacts.
+  void set_memory_size(int size) { memory_size_ = size; }
+  // Forgets all contacts.
+  void clear() {
+    const int size = memory_size_;
+    *this = ContactPool{};
+    memory_size_ = size;
+  }
+  int memory_size() const { return memory_size_; }
+  // Those of a contact or a point.
+  double* memory(const ContactBlock& block, int lane) {
+    return const_cast<double*>(std::as_const(*this).memory(block, lane));
+  }
+  const double* memory(const ContactBlock& block, int lane) const {
+    const auto index = [&](std::size_t number) { return (number * kBlock + lane) * memory_size_; };
+    if (!is_polygon(block)) return memory_.data() + index(&block - blocks_.data());
+    const auto from = reinterpret_cast<std::uintptr_t>(flats_.data());
+    return flat_memory_.data() +
+           index((reinterpret_cast<std::uintptr_t>(&block) - from) / sizeof(FlatContact));
+  }
+  // Whether a block holds the points of a polygon.
+  bool is_polygon(const ContactBlock& block) const {
+    return blocks_.empty() || std::less<>{}(&block, blocks_.data()) || std::less<>{}(&blocks_.back(), &block);
   }
   void remove(std::int32_t number) {
     drop_flat(number);
@@ -100,6 +134,10 @@ class ContactPool {
     free_flats_.pop_back();
     block(number).field[kFlat][lane(number)] = index;
     std::memset(static_cast<void*>(&flats_[index - 1]), 0, sizeof(FlatContact));
+    if (memory_size_ != 0) {
+      flat_memory_.resize(flats_.size() * kBlock * memory_size_);
+      std::fill_n(memory(flats_[index - 1].points, 0), kBlock * memory_size_, 0.0);
+    }
     return flats_[index - 1];
   }
   void drop_flat(std::int32_t number) {
@@ -111,38 +149,56 @@ class ContactPool {
   }
 
   // A contact with all that hangs on it as plain doubles, at most kMostContactSize of them: how many. And
-  // back: a new contact, and how many doubles it took.
+  // back: a new contact, and how many doubles it took. Its field `flat` then says what follows: 1 for a
+  // polygon, and twice the doubles of a model's memory. Another model's memory is not taken.
   int pack(std::int32_t number, double* to) const {
     ContactRecord record;
     const ContactBlock& from = blocks_[(number - 1) / kBlock];
     from.get(lane(number), 0, kContactSize, &record);
+    const int index = static_cast<int>(record.flat);
+    record.flat = (index != 0 ? 1 : 0) + 2 * memory_size_;
     std::memcpy(to, &record, sizeof record);
-    if (record.flat == 0) return kContactSize;
-    const FlatContact& flat = flats_[static_cast<int>(record.flat) - 1];
+    int size = kContactSize;
+    const auto put = [&](const void* values, int count) {
+      std::memcpy(to + size, values, count * sizeof(double));
+      size += count;
+    };
+    if (memory_size_ != 0) put(memory(from, lane(number)), memory_size_);
+    if (index == 0) return size;
+    const FlatContact& flat = flats_[index - 1];
     FlatRecord points;
     points.polygon = flat.polygon;
     for (int k = 0; k < kBlock; ++k) flat.points.get(k, kStateField, kContactStateSize, &points.state[k]);
-    std::memcpy(to + kContactSize, &points, sizeof points);
-    return kMostContactSize;
+    put(&points, kFlatSize);
+    if (memory_size_ != 0) put(memory(flat.points, 0), kBlock * memory_size_);
+    return size;
   }
   int packed_size(std::int32_t number) const {
-    return blocks_[(number - 1) / kBlock].field[kFlat][lane(number)] == 0 ? kContactSize : kMostContactSize;
+    const bool flat = blocks_[(number - 1) / kBlock].field[kFlat][lane(number)] != 0;
+    return kContactSize + memory_size_ + (flat ? kFlatSize + kBlock * memory_size_ : 0);
   }
   std::int32_t unpack(const double* from, int* size) {
     ContactRecord record;
     std::memcpy(&record, from, sizeof record);
-    const bool has_flat = record.flat != 0;
+    const int follows = static_cast<int>(record.flat), memory_size = follows / 2;
     record.flat = 0;
     const std::int32_t number = add(record);
     *size = kContactSize;
-    if (!has_flat) return number;
+    const auto get_memory = [&](ContactBlock& to, int lane, int count) {
+      if (memory_size == memory_size_ && memory_size != 0)
+        std::copy_n(from + *size, count * memory_size, memory(to, lane));
+      *size += count * memory_size;
+    };
+    get_memory(block(number), lane(number), 1);
+    if (follows % 2 == 0) return number;
     FlatRecord points;
-    std::memcpy(&points, from + kContactSize, sizeof points);
+    std::memcpy(&points, from + *size, sizeof points);
+    *size += kFlatSize;
     FlatContact& flat = add_flat(number);
     flat.polygon = points.polygon;
     flat.points.used = (1u << points.polygon.count) - 1;
     for (int k = 0; k < kBlock; ++k) flat.points.set(k, kStateField, kContactStateSize, &points.state[k]);
-    *size = kMostContactSize;
+    get_memory(flat.points, 0, kBlock);
     return number;
   }
 
@@ -152,7 +208,8 @@ class ContactPool {
   const LineVector<ContactBlock>& blocks() const { return blocks_; }
   const LineVector<FlatContact>& flats() const { return flats_; }
   std::size_t bytes() const {
-    return blocks_.capacity() * sizeof(ContactBlock) + flats_.capacity() * sizeof(FlatContact);
+    return blocks_.capacity() * sizeof(ContactBlock) + flats_.capacity() * sizeof(FlatContact) +
+           (memory_.capacity() + flat_memory_.capacity()) * sizeof(double);
   }
 
  private:
@@ -173,6 +230,8 @@ class ContactPool {
   std::vector<std::int32_t> free_;
   LineVector<FlatContact> flats_;
   std::vector<int> free_flats_;
+  int memory_size_ = 0;
+  std::vector<double> memory_, flat_memory_;  // by contact; by polygon and point
 };
 
 }  // namespace nurbs

@@ -77,6 +77,7 @@ void ContactStages::begin_neighbours() {
 void ContactStages::end_neighbours() {
   ContactPool old;
   std::swap(old, pool_);
+  pool_.set_memory_size(old.memory_size());
   expiry_.assign(a_.size(), -kInfinity);
   for (std::size_t k = 0; k < a_.size(); ++k) {
     PairProof& proof = *proofs_[k];
@@ -118,6 +119,7 @@ void ContactStages::set_law(int k) {
 }
 
 ContactCoefficients ContactStages::coefficients(const ContactBlock& block, int lane) const {
+  if (step_.model != nullptr) return {};
   return scaled(step_.laws[block.law[lane]], block.field[kWeight][lane]);
 }
 
@@ -429,6 +431,7 @@ void ContactStages::compute_block(ContactBlock& block) {
 }
 
 void ContactStages::apply_law(ContactBlock& block, const Results& results) {
+  if (step_.model != nullptr) return apply_model(block, results);
   for (int first = 0; first < kBlock; first += kWidth)
     step_.ledger ? apply_law<true>(block, first, results) : apply_law<false>(block, first, results);
 }
@@ -445,6 +448,13 @@ void ContactStages::start_run(ContactBlock& block, int lane, const Results& resu
     const double same = 10 * step_.settings.tolerance * smaller_radius(a, b) +
                         1e-13 * (results.offset_of(lane).norm() + load(record(a).x).norm());
     const bool goes_on = state.dt > 0 && same_geometry(state, geometry, same);
+    if (step_.model != nullptr) {
+      if (goes_on)
+        load_model(block, lane, state);
+      else
+        ask_model(block, lane, geometry, false);
+      return;
+    }
     if (!goes_on && !set_contact(law, geometry, motion_of(record(a)), motion_of(record(b)), state))
       counts_.value[ContactCounts::unresolved] += share(a, b);
   }
@@ -467,6 +477,7 @@ void ContactStages::start_run(ContactBlock& block, int lane, const Results& resu
 // Ends the law's part of a contact that has opened since the last step.
 void ContactStages::close(ContactBlock& block, int lane) {
   if (block.field[kStateField][lane] == 0) return;
+  if (step_.model != nullptr) return finish_model(block, lane);
   ContactState state;
   block.get(lane, kStateField, kContactStateSize, &state);
   const int a = block.a[lane], b = block.b[lane];
@@ -593,14 +604,23 @@ ContactStages::Sum ContactStages::total(const Accumulator& s) {
 
 ContactView ContactStages::view(const ContactBlock& block, int lane) const {
   const int a = block.a[lane], b = block.b[lane];
-  ContactView v{a, b, share(a, b), block.proof[lane], coefficients(block, lane), {}};
+  ContactView v{a, b, share(a, b), block.proof[lane], coefficients(block, lane), {}, Vec3::Zero(), {}};
   block.get(lane, kStateField, kContactStateSize, &v.state);
+  if (step_.model == nullptr) {
+    v.stored = stored_energy(v.law, v.state);
+    return v;
+  }
+  const auto& memory = *reinterpret_cast<const ModelMemory*>(pool_.memory(block, lane));
+  v.torque = load(memory.torque);
+  v.stored.normal_spring = memory.normal_energy;
+  v.stored.tangential_spring = memory.tangential_energy;
   return v;
 }
 
 EnergyLedger ContactStages::stored() const {
   EnergyLedger sum;
-  for_each_contact([&](const ContactView& c) { sum.add(stored_energy(c.law, c.state), c.share); });
+  for_each_contact([&](const ContactView& c) { sum.add(c.stored, c.share); });
+  if (step_.model != nullptr) return sum;
   for (const FlatContact& flat : pool_.flats())
     if (flat.points.used != 0)
       sum.normal_spring +=

@@ -13,6 +13,7 @@
 #include <string>
 #include <vector>
 
+#include "contact/effective_radius.h"
 #include "laws/energy_ledger.h"
 #include "scene/contact_pool.h"
 
@@ -48,8 +49,10 @@ struct ContactView {
   int a, b;      // bodies; a < 0: the wall
   double share;  // of the contact that is this rank's: a half where one body is a ghost
   PairProof* proof;
-  ContactCoefficients law;  // with the contact's share of the stiffness
+  ContactCoefficients law;  // with the contact's share of the stiffness; zeros where a model serves
   ContactState state;
+  Vec3 torque;          // of a model beside that of the force, on B
+  EnergyLedger stored;  // in its springs
 };
 
 // Whether a result is a contact.
@@ -71,6 +74,8 @@ class ContactStages {
     const int* types = nullptr;
     int type_count = 0;
     const ContactCoefficients* laws = nullptr;
+    // Serves instead of the laws, which are then not read. Its contacts' memory must have been allotted.
+    const ContactModel* model = nullptr;
     // Partner of neighbours with a < 0: a plane through its x with this normal; free = 0, mass infinite.
     const BodyRecord* wall = nullptr;
     Vec3 wall_normal = Vec3::Zero();
@@ -111,6 +116,7 @@ class ContactStages {
   const EnergyLedger& dissipated() const { return dissipated_; }
   EnergyLedger stored() const;
   ContactPool& pool() { return pool_; }
+  const ContactPool& pool() const { return pool_; }
   std::size_t bytes() const;
 
   // Calls visit(ContactView) for every touching contact.
@@ -158,6 +164,22 @@ class ContactStages {
   void apply_law(ContactBlock& block, const Results& results);
   template <bool ledger>
   void apply_law(ContactBlock& block, int first, const Results& results);
+
+  // A contact model in the law's place: model_stage.cpp.
+  ModelMemory& model_memory(const ContactBlock& block, int lane) {
+    return *reinterpret_cast<ModelMemory*>(pool_.memory(block, lane));
+  }
+  SphereCurvatures model_curvatures(const ContactBlock& block, int lane, const Vec3& normal) const;
+  void apply_model(ContactBlock& block, const Results& results);
+  void ask_model(ContactBlock& block, int lane, const ContactGeometry& geometry, bool moves_on);
+  void book_model(const ContactBlock& block, int lane, const ContactState& before, const ModelMemory& old,
+                  const ContactState& now, const ModelMemory& own);
+  void finish_model(ContactBlock& block, int lane);
+  void take_over_model(const double* from, ContactBlock& block, int lane);
+  void remake_model(FlatContact& flat, const ContactPolygon& polygon, const int* source);
+  void leave_model(ContactBlock& block, int lane, FlatContact& flat, const PolygonState& state,
+                   double overlap, ContactState* single);
+  void load_model(const ContactBlock& block, int lane, const ContactState& state);
 
   // Flat faces, creases and ruled lines: flat_stage.cpp.
   bool may_be_flat(int a, int b) const;

@@ -109,7 +109,12 @@ bool ContactStages::make_flat(ContactBlock& block, int lane, const Results& sing
   flat.points.used = (1u << polygon.count) - 1;
   bind(block.neighbour[lane]);
   set_law(block.neighbour[lane]);
-  if (old.active != 0) {
+  if (old.active != 0 && step_.model != nullptr) {
+    double memory[kMostModelMemory];
+    std::copy_n(pool_.memory(block, lane), pool_.memory_size(), memory);
+    finish_model(block, lane);
+    for (int k = 0; k < polygon.count; ++k) take_over_model(memory, flat.points, k);
+  } else if (old.active != 0) {
     const ContactCoefficients& all = step_.laws[block.law[lane]];
     const BodyMotion motion_a = motion_of(record(a)), motion_b = motion_of(record(b));
     finish(scaled(all, weight), a, b, old);
@@ -164,6 +169,10 @@ bool ContactStages::serve_flat(ContactBlock& block, int lane) {
 // Towards the polygon's own stiffness; what the springs give up is booked.
 void ContactStages::relax_factor(const ContactBlock& block, int lane, FlatContact& flat,
                                  const PolygonState& state) {
+  if (step_.model != nullptr) {  // what its springs give up is missing at the next step's balance
+    relax(flat.polygon, state, kRelaxation);
+    return;
+  }
   const ContactCoefficients& law = step_.laws[block.law[lane]];
   const double before = flat.polygon.factor;
   double energy = law.kn * relax(flat.polygon, state, kRelaxation);
@@ -189,6 +198,11 @@ bool ContactStages::remake(ContactBlock& block, int lane, FlatContact& flat, Pol
   if (holds > held) polygon.factor *= held / holds;
   int source[kContactPoints];
   match(flat.polygon, state, polygon, fresh, source);
+  if (step_.model != nullptr) {
+    remake_model(flat, polygon, source);
+    state = fresh;
+    return true;
+  }
 
   const ContactCoefficients& all = step_.laws[block.law[lane]];
   const BodyMotion motion_a = motion_of(record(a)), motion_b = motion_of(record(b));
@@ -242,7 +256,11 @@ void ContactStages::leave_flat(ContactBlock& block, int lane, FlatContact& flat,
   const int a = block.a[lane], b = block.b[lane];
   ContactState single{};
   double weight = 1;
-  if (overlap > 0) {
+  if (step_.model != nullptr) {
+    leave_model(block, lane, flat, state, overlap, &single);
+    if (overlap > 0)
+      weight = std::min(2 * stored_energy(flat.polygon, state) / (overlap * overlap), kStiffest);
+  } else if (overlap > 0) {
     const ContactCoefficients& all = step_.laws[block.law[lane]];
     const BodyMotion motion_a = motion_of(record(a)), motion_b = motion_of(record(b));
     const double held = stored_energy(flat.polygon, state);
@@ -286,12 +304,13 @@ void ContactStages::relax_weight(ContactBlock& block, int lane, double gap) {
   }
   if (weight < 1) return;
   const double change = kRelaxation * (1 - weight);
+  weight += change;
+  if (step_.model != nullptr) return;
   ContactState state;
   block.get(lane, kStateField, kContactStateSize, &state);
   const ContactCoefficients& law = step_.laws[block.law[lane]];
   book(-0.5 * change * (law.kn * gap * gap + law.kt * load(state.spring).squaredNorm()), block.a[lane],
        block.b[lane]);
-  weight += change;
 }
 
 }  // namespace nurbs

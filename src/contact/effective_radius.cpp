@@ -1,0 +1,68 @@
+// See effective_radius.h.
+#include "contact/effective_radius.h"
+
+#include <cmath>
+
+namespace nurbs {
+
+SurfaceCurvature curvature_of(const SupportModel& model, const Mat3& axes) {
+  const double det = model.w0 * model.w2 - model.w1 * model.w1;
+  if (!(det > 0) || !(model.w0 > 0)) return {};
+  const Vec3 n = axes * vec(model.normal), t = axes * vec(model.tangent), s = n.cross(t);
+  SurfaceCurvature k;
+  k.tensor = (model.w2 * t * t.transpose() - model.w1 * (t * s.transpose() + s * t.transpose()) +
+              model.w0 * s * s.transpose()) /
+             det;
+  k.known = k.tensor.allFinite();
+  return k;
+}
+
+// II in the orthonormal frame (t, s): J^-T II J^-1, with J = (lu, t.sv; 0, s.sv) from parameters to the
+// frame.
+SurfaceCurvature curvature_at(const Particle& particle, const PointMemory& point, const Vec3& outward) {
+  using Slot = JetLanes::Slot;
+  const int patch = static_cast<int>(point.patch);
+  if (!(point.patch >= 0) || patch >= static_cast<int>(particle.shape->patches.size())) return {};
+  JetLanes jet;
+  evaluate2(particle.shape->patches[patch], point.u, point.v, &jet);
+  scale(particle.scale, &jet);
+  const Vec3 su = jet.at(Slot::kSu), sv = jet.at(Slot::kSv), cross = su.cross(sv);
+  const double area = cross.norm(), lu = su.norm();
+  if (!(area > 0)) return {};
+  const Vec3 n = cross / area, t = su / lu, s = n.cross(t);
+  const Mat3 axes = particle.q.toRotationMatrix();
+  if (!((axes * n - outward).squaredNorm() < kCreaseAngle2)) return {};
+  Lane8 bend;
+  dot(jet, n, &bend);
+  const double l = -bend[3], m = -bend[4], k = -bend[5], shear = t.dot(sv), height = s.dot(sv);
+  const double tt = l / (lu * lu), ts = (m - shear / lu * l) / (lu * height);
+  const double ss = (k - 2 * shear / lu * m + shear * shear * tt) / (height * height);
+  const Vec3 lab_t = axes * t, lab_s = axes * s;
+  SurfaceCurvature c;
+  c.tensor = tt * lab_t * lab_t.transpose() + ts * (lab_t * lab_s.transpose() + lab_s * lab_t.transpose()) +
+             ss * lab_s * lab_s.transpose();
+  c.known = c.tensor.allFinite();
+  return c;
+}
+
+double hertz_radius(double k_a, double k_b) {
+  const double mean = std::sqrt(k_a * k_b), x = std::log(0.5 * (k_a + k_b) / mean);
+  return std::exp(x * (0.33249 + x * (0.07766 - 0.00461 * x))) / mean;
+}
+
+SphereCurvatures sphere_curvatures(const SurfaceCurvature& a, const SurfaceCurvature& b, const Vec3& normal,
+                                   double cap, bool plane) {
+  if (!a.known || !b.known) return flat_curvatures(cap, plane);
+  const Vec3 t = normal.unitOrthogonal(), s = normal.cross(t);
+  const Mat3 sum = a.tensor + b.tensor;
+  const double tt = t.dot(sum * t), ts = t.dot(sum * s), ss = s.dot(sum * s);
+  const double mean = 0.5 * (tt + ss), half = std::hypot(0.5 * (tt - ss), ts);
+  if (!(mean - half > 1e-12 * mean)) return flat_curvatures(cap, plane);
+  const double curvature = 1 / hertz_radius(mean - half, mean + half);
+  if (!(curvature * cap * kFlatRadius >= 1)) return flat_curvatures(cap, plane);
+  if (plane) return {0, curvature};
+  const double of_a = std::fmax(0, a.tensor.trace()), of_b = std::fmax(0, b.tensor.trace());
+  return {curvature * of_a / (of_a + of_b), curvature * of_b / (of_a + of_b)};
+}
+
+}  // namespace nurbs

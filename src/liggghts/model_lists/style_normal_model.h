@@ -1,0 +1,10 @@
+// The host's contact models of this kind: its own generated list, which is not packaged.
+#include "normal_model_edinburgh.h"
+#include "normal_model_edinburgh_stiffness.h"
+#include "normal_model_hertz.h"
+#include "normal_model_hertz_stiffness.h"
+#include "normal_model_hooke.h"
+#include "normal_model_hooke_hysteresis.h"
+#include "normal_model_hooke_stiffness.h"
+#include "normal_model_luding.h"
+#include "normal_model_thornton_ning.h"
