@@ -1,6 +1,7 @@
 // atom_style nurbs. See atom_vec_nurbs.h; file formats are in the README, "Data files".
 #include "liggghts/atom_vec_nurbs.h"
 
+#include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
@@ -11,8 +12,10 @@
 #include "comm.h"
 #include "domain.h"
 #include "error.h"
-#include "fix.h"
+#include "fix_insert.h"
+#include "fix_particledistribution_discrete.h"
 #include "lammps.h"
+#include "liggghts/fix_template_nurbs.h"
 #include "liggghts/host_error.h"
 #include "memory.h"
 #include "modify.h"
@@ -67,6 +70,18 @@ bool parse(const char* word, int& value) {
 // Mass the host's `set density` and `set diameter` give a particle: that of its bounding sphere.
 double sphere_mass(double radius, double density) {
   return 4.0 * M_PI / 3.0 * radius * radius * radius * density;
+}
+
+// Everybody's numbers, on all ranks in their order. Collective.
+std::vector<double> gather_all(MPI_Comm world, const std::vector<double>& mine) {
+  int ranks = 0, count = static_cast<int>(mine.size());
+  MPI_Comm_size(world, &ranks);
+  std::vector<int> counts(ranks), starts(ranks + 1, 0);
+  MPI_Allgather(&count, 1, MPI_INT, counts.data(), 1, MPI_INT, world);
+  for (int k = 0; k < ranks; ++k) starts[k + 1] = starts[k] + counts[k];
+  std::vector<double> all(starts[ranks]);
+  MPI_Allgatherv(mine.data(), count, MPI_DOUBLE, all.data(), counts.data(), starts.data(), MPI_DOUBLE, world);
+  return all;
 }
 
 bool close(double a, double b) {
@@ -242,19 +257,85 @@ void AtomVecNurbs::init() {
   if (domain->dimension != 3) nurbs_host::fail_all(FLERR, lmp, "atom_style nurbs needs a 3d simulation");
   if (domain->is_wedge) nurbs_host::fail_all(FLERR, lmp, "atom_style nurbs cannot be used in a wedge domain");
   if (shapes_.count() == 0) nurbs_host::fail_all(FLERR, lmp, "atom_style nurbs has no shapes");
-  refuse_insertion();
+  refuse_spheres_to_insert();
   for (int i = 0; i < atom->nlocal; ++i) follow_set_command(i);
   if (const std::string bad = check_all_owned(); !bad.empty()) nurbs_host::fail_one(lmp, bad);
 }
 
 // The host inserts when a run begins, after init.
-void AtomVecNurbs::refuse_insertion() {
-  if (const char* style = nurbs_host::fix_style_with(lmp, "insert/"))
-    nurbs_host::fail_all(
-        FLERR, lmp,
-        std::string("Fix ") + style +
-            " inserts spheres and can't be used with atom_style nurbs; give the particles in "
-            "a data file (read_data) or by create_atoms");
+void AtomVecNurbs::refuse_spheres_to_insert() {
+  for (int k = 0; k < modify->nfix; ++k) {
+    auto* insert = dynamic_cast<FixInsert*>(modify->fix[k]);
+    if (insert == nullptr) continue;
+    FixParticledistributionDiscrete* distribution = insert->get_distribution();
+    for (int n = 0; n < distribution->n_particletemplates(); ++n) {
+      const Fix* model = distribution->particletemplates()[n];
+      if (dynamic_cast<const FixTemplateNurbs*>(model) == nullptr)
+        nurbs_host::fail_all(FLERR, lmp,
+                             std::string("Fix ") + insert->style + " " + insert->id + ": its template " +
+                                 model->id + " is of " + model->style +
+                                 "; atom_style nurbs needs fix particletemplate/nurbs");
+    }
+  }
+}
+
+// In the course of a step the host has its ghosts, of one step before, but drops them after an insertion; the
+// next fix insert/* of that step could not know what reaches over from other ranks or periodic images.
+void AtomVecNurbs::begin_insertion(double radius) {
+  site_size_ = std::max(site_size_, radius);
+  foreign_.clear();
+  bigint mine[2] = {atom->nlocal, atom->nghost}, all[2];
+  MPI_Allreduce(mine, all, 2, MPI_LMP_BIGINT, MPI_SUM, world);
+  if (all[0] > 0 && all[1] == 0) foreign_ = foreign_bodies(site_size_);
+}
+
+nurbs::InsertionSite& AtomVecNurbs::insertion_site() {
+  if (site_size_ > 0) {
+    site_.clear(site_size_);
+    for (int i = 0; i < atom->nlocal + atom->nghost; ++i) site_.add(particle(i));
+    for (const nurbs::Particle& body : foreign_) site_.add(body);
+    site_size_ = 0;
+  }
+  return site_;
+}
+
+// Bodies and periodic images that may be in the way of one of this radius whose centre is on this rank, other
+// than the rank's own bodies. Collective; gives every rank what is near some rank's border.
+std::vector<nurbs::Particle> AtomVecNurbs::foreign_bodies(double radius) const {
+  const auto outside = [&](const double* x, double by) {
+    bool out = false;
+    for (int k = 0; k < 3; ++k) out |= x[k] < domain->sublo[k] - by || x[k] > domain->subhi[k] + by;
+    return out;
+  };
+  std::vector<double> mine;
+  for (int i = 0; i < atom->nlocal; ++i) {
+    if (!outside(x_[i], -(radius + radius_[i]))) continue;
+    mine.push_back(shapetype_[i]);
+    mine.push_back(scale_[i]);
+    mine.insert(mine.end(), x_[i], x_[i] + 3);
+    mine.insert(mine.end(), quaternion_[i], quaternion_[i] + 4);
+  }
+  const std::vector<double> all = gather_all(world, mine);
+  const double length[3] = {domain->xprd, domain->yprd, domain->zprd};
+  std::vector<nurbs::Particle> found;
+  for (std::size_t at = 0; at < all.size(); at += 9) {
+    nurbs::Particle body;
+    body.shape = shapes_.shape(static_cast<int>(all[at]));
+    body.scale = all[at + 1];
+    body.q = to_quat(&all[at + 5]);
+    for (int image = 0; image < 27; ++image) {
+      const int shift[3] = {image % 3 - 1, image / 3 % 3 - 1, image / 9 - 1};
+      bool exists = true;
+      for (int k = 0; k < 3; ++k) {
+        exists &= shift[k] == 0 || domain->periodicity[k] != 0;
+        body.x[k] = all[at + 2 + k] + shift[k] * length[k];
+      }
+      if (exists && outside(body.x.data(), 0) &&
+          !outside(body.x.data(), radius + body.scale * body.shape->bounding_radius))
+        found.push_back(body);
+    }
+  }
+  return found;
 }
 
 // The host's `set` command treats a particle as a sphere. `set diameter` (of the bounding sphere) means a

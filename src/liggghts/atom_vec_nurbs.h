@@ -19,6 +19,7 @@ AtomStyle(nurbs,AtomVecNurbs)
 #include "motion/rotation.h"
 #include "motion/rotor.h"
 #include "scene/bodies.h"
+#include "scene/insertion_site.h"
 
 namespace LAMMPS_NS {
 
@@ -67,6 +68,11 @@ class AtomVecNurbs : public AtomVec {
   // Makes particle i a body of this shape, scale, density and orientation (normalised), and sets what follows
   // from them: mass and bounding radius. The values must be valid.
   void set_body(int i, int shape_number, double scale, double density, const nurbs::Quat& orientation);
+
+  // A fix insert/* begins: the bodies that are there now, ghosts too, are what insertion_site() holds, until
+  // the next begins. `radius`: the largest that will be inserted. Collective.
+  void begin_insertion(double radius);
+  nurbs::InsertionSite& insertion_site();
 
   void settings(int narg, char** arg) override;
   void init() override;
@@ -143,7 +149,8 @@ class AtomVecNurbs : public AtomVec {
   double* get_border(int n, int first, bool velocity, double* p);
 
   int append_atom(int type, const double* coord, tagint image);
-  void refuse_insertion();
+  void refuse_spheres_to_insert();
+  std::vector<nurbs::Particle> foreign_bodies(double radius) const;
   void follow_set_command(int i);
   void update_size(int i);
   std::string check_all_owned() const;
@@ -151,6 +158,10 @@ class AtomVecNurbs : public AtomVec {
   ShapeLibrary shapes_;
   std::vector<const nurbs::Shape*> shape_table_;  // by shape number; [0] is none
   nurbs::Bodies bodies_;
+
+  nurbs::InsertionSite site_;
+  double site_size_ = 0;                  // > 0: to be filled when asked for
+  std::vector<nurbs::Particle> foreign_;  // of other ranks and periodic images, while there are no ghosts
 
   // The host's arrays (owned by Atom), and the two that Atom has no place for.
   int *tag_ = nullptr, *type_ = nullptr, *mask_ = nullptr, *shapetype_ = nullptr;

@@ -69,6 +69,14 @@ double parse_not_negative(LAMMPS* lmp, const std::string& what, const char* text
   return value;
 }
 
+nurbs::Quat parse_quaternion(LAMMPS* lmp, const std::string& what, char** text) {
+  double q[4];
+  for (int k = 0; k < 4; ++k) q[k] = parse_number(lmp, what, text[k]);
+  const double length = nurbs::Quat(q[0], q[1], q[2], q[3]).coeffs().stableNorm();
+  if (!(length > 0)) fail_all(FLERR, lmp, what + " 0 0 0 0 must have a length > 0");
+  return nurbs::Quat(q[0] / length, q[1] / length, q[2] / length, q[3] / length).normalized();
+}
+
 ContactCoefficients parse_coefficients(LAMMPS* lmp, const std::string& user, int first, int narg,
                                        char** arg) {
   ContactCoefficients law;

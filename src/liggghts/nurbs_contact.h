@@ -28,6 +28,9 @@ double parse_number(LAMMPS* lmp, const std::string& what, const char* text);
 double parse_positive(LAMMPS* lmp, const std::string& what, const char* text);
 double parse_not_negative(LAMMPS* lmp, const std::string& what, const char* text);
 
+// Four numbers, w x y z, normalised; not all 0. Ends the run otherwise. Collective.
+nurbs::Quat parse_quaternion(LAMMPS* lmp, const std::string& what, char** text);
+
 // Edge k of the box as a vector.
 nurbs::Vec3 box_edge(const class Domain& domain, int k);
 

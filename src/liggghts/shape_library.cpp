@@ -151,4 +151,12 @@ int ShapeLibrary::number_of(const std::string& name) const {
   return 0;
 }
 
+int ShapeLibrary::require(const std::string& user, const std::string& name) const {
+  const int number = number_of(name);
+  if (number != 0) return number;
+  std::string names;
+  for (const auto& shape : shapes_) names += " " + shape->name;
+  nurbs_host::fail_all(FLERR, lmp, user + ": shape " + name + " is not one of atom_style nurbs:" + names);
+}
+
 }  // namespace LAMMPS_NS

@@ -37,6 +37,9 @@ class ShapeLibrary : protected Pointers {
   // The number of the first shape of this name, or 0 when there is none.
   int number_of(const std::string& name) const;
 
+  // The same; ends the run, naming what there is, when there is none. `user` opens the message. Collective.
+  int require(const std::string& user, const std::string& name) const;
+
  private:
   struct Source {
     std::string name;  // of the shape: the file's stem

@@ -9,6 +9,8 @@
 #include "liggghts/compute_nurbs_stats.h"
 #include "liggghts/dump_nurbs_vtk.h"
 #include "liggghts/fix_contact_history_nurbs.h"
+#include "liggghts/fix_insert_pack_nurbs.h"
 #include "liggghts/fix_nve_nurbs.h"
+#include "liggghts/fix_template_nurbs.h"
 #include "liggghts/fix_wall_nurbs.h"
 #include "liggghts/pair_gran_nurbs.h"

@@ -391,7 +391,7 @@ class BadInput(unittest.TestCase):
         for kind, options in (("pack", "insert_every once all_in yes particles_in_region 1 region r"),
                               ("rate/region", "nparticles 1 particlerate 100 insert_every 10 all_in yes region r")):
             insert = f"fix i all insert/{kind} seed 86028121 distributiontemplate d {options}\n"
-            self.refuse(text + region + insert + "run 10\n", f"Fix insert/{kind} ", "read_data", "create_atoms",
+            self.refuse(text + region + insert + "run 10\n", f"Fix insert/{kind} i: its template t is of particletemplate/sphere",
                         on=(1, 2), files=files())
         deck.run_ok(text + "run 1\n", files=files())
 

@@ -1,0 +1,82 @@
+// Insertion sites against asking every body, and against the closed form for spheres.
+#include <gtest/gtest.h>
+
+#include "contact/pair_search.h"
+#include "scene/insertion_site.h"
+#include "support/bodies.h"
+#include "support/random.h"
+
+namespace nurbs {
+namespace {
+
+using namespace test;
+
+Particle random_body(Random& random, const ShapePointer& shape, double low, double high, double room) {
+  Particle body;
+  body.shape = shape.get();
+  body.scale = random.log_uniform(low, high);
+  for (int k = 0; k < 3; ++k) body.x[k] = random.uniform(-room, room);
+  body.q = random.turn();
+  return body;
+}
+
+bool touch(const Particle& a, const Particle& b) {
+  ContactSettings settings;
+  settings.tolerance = 1e-9;
+  double memory[kPairMemorySize] = {};
+  return find_contact(a, b, settings, memory).gap <= 0;
+}
+
+// Sizes 1:30 in cells made for the largest, the smallest and one in between.
+TEST(InsertionSite, finds_what_asking_every_body_finds) {
+  for (const double size : {0.1, 0.6, 3.0}) {
+    Random random(7);
+    InsertionSite site;
+    site.clear(size);
+    std::vector<Particle> placed;
+    int found = 0;
+    for (int k = 0; k < 1500; ++k) {
+      const Particle body = random_body(random, all_shapes()[k % all_shapes().size()], 0.1, 3, 8);
+      bool expected = false;
+      for (const Particle& other : placed) {
+        const double reach =
+            body.scale * body.shape->bounding_radius + other.scale * other.shape->bounding_radius;
+        expected |= (body.x - other.x).norm() < reach && touch(other, body);
+        if (expected) break;
+      }
+      ASSERT_EQ(site.overlaps(body, Overlap::exact), expected) << k;
+      found += expected;
+      if (expected) continue;
+      site.add(body);
+      placed.push_back(body);
+    }
+    EXPECT_EQ(site.count(), static_cast<int>(placed.size()));
+    EXPECT_GT(found, 100);
+    EXPECT_GT(placed.size(), 100u);
+  }
+}
+
+TEST(InsertionSite, tells_spheres_at_a_hair) {
+  InsertionSite site;
+  site.clear(1);
+  Particle ball;
+  ball.shape = sphere().get();
+  ball.x = Vec3(-1e-12, 7, -3);  // at a border of cells
+  site.add(ball);
+  Random random(3);
+  for (int k = 0; k < 200; ++k) {
+    Particle other = ball;
+    other.scale = random.uniform(0.01, 20);
+    const Vec3 d = random.direction();
+    for (const double gap : {-1e-4, 1e-4}) {
+      other.x = ball.x + (1 + other.scale + gap) * d;
+      for (const Overlap judge : {Overlap::exact, Overlap::sphere})
+        ASSERT_EQ(site.overlaps(other, judge), gap < 0) << other.scale;
+    }
+  }
+  site.clear(1);
+  EXPECT_FALSE(site.overlaps(ball, Overlap::exact));
+}
+
+}  // namespace
+}  // namespace nurbs
