@@ -197,7 +197,10 @@ class ContactPool {
     FlatContact& flat = add_flat(number);
     flat.polygon = points.polygon;
     flat.points.used = (1u << points.polygon.count) - 1;
-    for (int k = 0; k < kBlock; ++k) flat.points.set(k, kStateField, kContactStateSize, &points.state[k]);
+    for (int k = 0; k < kBlock; ++k) {
+      flat.points.set(k, kStateField, kContactStateSize, &points.state[k]);
+      flat.points.field[kWeight][k] = points.polygon.factor * points.polygon.weight[k];
+    }
     get_memory(flat.points, 0, kBlock);
     return number;
   }

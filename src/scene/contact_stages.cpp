@@ -389,7 +389,8 @@ void ContactStages::compute_block(ContactBlock& block) {
       continue;
     }
     const int a = block.a[lane], b = block.b[lane];
-    if (block.field[kFlat][lane] != 0 && serve_flat(block, lane)) {
+    LeftPolygon left;
+    if (block.field[kFlat][lane] != 0 && serve_flat(block, lane, &left)) {
       results.touching[lane] = 0;
       continue;
     }
@@ -404,6 +405,7 @@ void ContactStages::compute_block(ContactBlock& block) {
     } else {
       solve_lane(block, lane, results);
     }
+    if (left.any) settle_left(block, lane, results, left);
     if (step_.setup) {
       const bool first = results.touching[lane] != 0 && block.field[kStateField][lane] == 0;
       if (!(first && may_be_flat(a, b) && make_flat(block, lane, results))) start_run(block, lane, results);

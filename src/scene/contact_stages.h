@@ -187,11 +187,17 @@ class ContactStages {
                     ContactPolygon* polygon) const;
   void finish(const ContactCoefficients& law, int a, int b, const ContactState& state);
   bool make_flat(ContactBlock& block, int lane, const Results& single);
-  bool serve_flat(ContactBlock& block, int lane);
+  struct LeftPolygon {  // what a polygon leaves behind
+    bool any = false;
+    double normal_energy = 0, tangential_energy = 0;
+    Vec3 spring = Vec3::Zero();  // mean of the tangential springs, weighted with the normal ones
+  };
+  bool serve_flat(ContactBlock& block, int lane, LeftPolygon* left);
   bool remake(ContactBlock& block, int lane, FlatContact& flat, PolygonState& state, double overlap);
   void run_flat(ContactBlock& block, int lane, FlatContact& flat, const PolygonState& state);
-  void leave_flat(ContactBlock& block, int lane, FlatContact& flat, const PolygonState& state,
-                  double overlap);
+  LeftPolygon leave_flat(ContactBlock& block, int lane, FlatContact& flat, const PolygonState& state,
+                         double overlap);
+  void settle_left(ContactBlock& block, int lane, const Results& results, const LeftPolygon& left);
   void relax_factor(const ContactBlock& block, int lane, FlatContact& flat, const PolygonState& state);
   void relax_weight(ContactBlock& block, int lane, double gap);
   void book(double energy, int a, int b);

@@ -8,11 +8,13 @@
 namespace nurbs {
 namespace {
 
-// Of its distance to 1 that a factor above it moves in a step: a corner that has come down flat is up to four
-// times too stiff, and the spring energy that it gives up is booked. A factor below 1 stays until the contact
-// opens: raising it would put energy in.
+// Of its distance to 1 that a factor moves in a step: a corner that has come down flat is up to four times
+// too stiff, and the spring energy that it gives up is booked. A factor below 1 waits until the contact
+// rests: what raising it puts in is booked too, and is then no more than the springs hold under the bodies'
+// weight.
 constexpr double kRelaxation = 2e-3;
-constexpr double kStiffest = 8;  // factor or weight of a contact; four is what a corner needs
+constexpr double kResting = 1e-4;  // of its overlap that a contact at rest moves along the normal in a step
+constexpr double kStiffest = 8;    // factor or weight of a contact; four is what a corner needs
 
 BodyFrame frame_of(const BodyRecord& r, double scale, const Shape* shape) {
   BodyFrame f;
@@ -50,6 +52,10 @@ void take_over(const ContactCoefficients& law, const ContactGeometry& g, const B
   state->dt = dt;
   state->damping_force = 0;
   for (int k = 0; k < 3; ++k) state->tangential_force[k] = -law.kt * state->spring[k];
+}
+
+bool rests(const ContactState& state) {
+  return state.active == 0 || std::abs(state.rate) * state.dt < kResting * state.overlap;
 }
 
 }  // namespace
@@ -98,6 +104,7 @@ bool ContactStages::make_flat(ContactBlock& block, int lane, const Results& sing
   ContactPolygon polygon;
   if (!find_polygon(a, b, single.normal_of(lane), overlap, kReach * overlap, nullptr, &polygon)) return false;
   const PolygonState state = now(polygon, *step_.bodies, step_.wall, a, b);
+  if (!(state.energy > 0)) return false;
   const double weight = block.field[kWeight][lane];
   polygon.factor = continuity_factor(0.5 * weight * overlap * overlap, polygon, state);
   if (!(polygon.factor < kStiffest)) return false;
@@ -137,7 +144,7 @@ bool ContactStages::make_flat(ContactBlock& block, int lane, const Results& sing
 }
 
 // One step of a pair that has a polygon; false when it has left it, and the single contact serves again.
-bool ContactStages::serve_flat(ContactBlock& block, int lane) {
+bool ContactStages::serve_flat(ContactBlock& block, int lane, LeftPolygon* left) {
   const int a = block.a[lane], b = block.b[lane];
   FlatContact& flat = *pool_.flat_of(block, lane);
   PolygonState state = now(flat.polygon, *step_.bodies, step_.wall, a, b);
@@ -156,11 +163,11 @@ bool ContactStages::serve_flat(ContactBlock& block, int lane) {
       }
     }
     if (!stays) {
-      leave_flat(block, lane, flat, state, overlap);
+      *left = leave_flat(block, lane, flat, state, overlap);
       return false;
     }
   }
-  if (!step_.setup && flat.polygon.factor > 1) relax_factor(block, lane, flat, state);
+  if (!step_.setup && flat.polygon.factor != 1) relax_factor(block, lane, flat, state);
   counts_.value[ContactCounts::local_model] += share(a, b);
   run_flat(block, lane, flat, state);
   return true;
@@ -170,18 +177,21 @@ bool ContactStages::serve_flat(ContactBlock& block, int lane) {
 void ContactStages::relax_factor(const ContactBlock& block, int lane, FlatContact& flat,
                                  const PolygonState& state) {
   if (step_.model != nullptr) {  // what its springs give up is missing at the next step's balance
+    if (flat.polygon.factor < 1) return;
     relax(flat.polygon, state, kRelaxation);
     return;
   }
   const ContactCoefficients& law = step_.laws[block.law[lane]];
   const double before = flat.polygon.factor;
-  double energy = law.kn * relax(flat.polygon, state, kRelaxation);
+  double tangential = 0;  // energy at factor 1
   for (int k = 0; k < state.count; ++k) {
     ContactState point;
     flat.points.get(k, kStateField, kContactStateSize, &point);
-    energy +=
-        (flat.polygon.factor - before) * flat.polygon.weight[k] * stored_energy(law, point).tangential_spring;
+    if (before < 1 && !rests(point)) return;
+    tangential += flat.polygon.weight[k] * stored_energy(law, point).tangential_spring;
   }
+  double energy = law.kn * relax(flat.polygon, state, kRelaxation);
+  energy += (flat.polygon.factor - before) * tangential;
   book(-energy, block.a[lane], block.b[lane]);
 }
 
@@ -249,52 +259,63 @@ void ContactStages::run_flat(ContactBlock& block, int lane, FlatContact& flat, c
   if (!step_.setup) apply_law(flat.points, results);
 }
 
-// Back to one contact, of the deepest point: it gets the springs' mean, weighted, and a weight that keeps the
-// energy; what its springs hold less than the polygon's did is booked.
-void ContactStages::leave_flat(ContactBlock& block, int lane, FlatContact& flat, const PolygonState& state,
-                               double overlap) {
+// The end of the polygon, and what it leaves to the pair's one contact, which settle_left places.
+ContactStages::LeftPolygon ContactStages::leave_flat(ContactBlock& block, int lane, FlatContact& flat,
+                                                     const PolygonState& state, double overlap) {
   const int a = block.a[lane], b = block.b[lane];
-  ContactState single{};
-  double weight = 1;
+  LeftPolygon left;
+  left.any = true;
+  left.normal_energy = stored_energy(flat.polygon, state);
   if (step_.model != nullptr) {
+    ContactState single{};
     leave_model(block, lane, flat, state, overlap, &single);
-    if (overlap > 0)
-      weight = std::min(2 * stored_energy(flat.polygon, state) / (overlap * overlap), kStiffest);
-  } else if (overlap > 0) {
-    const ContactCoefficients& all = step_.laws[block.law[lane]];
-    const BodyMotion motion_a = motion_of(record(a)), motion_b = motion_of(record(b));
-    const double held = stored_energy(flat.polygon, state);
-    weight = std::min(2 * held / (overlap * overlap), kStiffest);
-    book(all.kn * (held - 0.5 * weight * overlap * overlap), a, b);
-    Vec3 spring = Vec3::Zero(), arm_a = Vec3::Zero(), arm_b = Vec3::Zero();
-    double sum = 0, energy = 0;
-    for (int k = 0; k < state.count; ++k) {
-      ContactState point;
-      flat.points.get(k, kStateField, kContactStateSize, &point);
-      const ContactCoefficients own = coefficients(flat.points, k);
-      if (point.active != 0) {
-        finish(own, a, b, point);
-        energy += stored_energy(own, point).tangential_spring;
-      }
-      const double load_of = std::max(0.0, -state.gap[k]) * flat.polygon.weight[k];
-      sum += load_of;
-      spring += load_of * load(point.spring);
-      arm_a += load_of * state.arm_a[k];
-      arm_b += load_of * state.arm_b[k];
-    }
-    const ContactCoefficients own = scaled(all, weight);
-    take_over(own, {overlap, state.normal, arm_a / sum, arm_b / sum}, motion_a, motion_b, step_.dt,
-              spring / sum, &single);
-    book(energy - stored_energy(own, single).tangential_spring, a, b);
-  } else {
-    for (int k = 0; k < state.count; ++k) close(flat.points, k);
+    block.set(lane, kStateField, kContactStateSize, &single);
+    pool_.drop_flat(block.proof[lane]->contact);
+    return left;
   }
+  left.normal_energy *= step_.laws[block.law[lane]].kn;
+  double sum = 0;
+  for (int k = 0; k < state.count; ++k) {
+    ContactState point;
+    flat.points.get(k, kStateField, kContactStateSize, &point);
+    if (point.active == 0) continue;
+    const ContactCoefficients own = coefficients(flat.points, k);
+    finish(own, a, b, point);
+    left.tangential_energy += stored_energy(own, point).tangential_spring;
+    const double load_of = std::max(0.0, -state.gap[k]) * flat.polygon.weight[k];
+    sum += load_of;
+    left.spring += load_of * load(point.spring);
+  }
+  if (sum > 0) left.spring /= sum;
   pool_.drop_flat(block.proof[lane]->contact);
-  block.set(lane, kStateField, kContactStateSize, &single);
-  block.field[kWeight][lane] = weight;
+  return left;
 }
 
-// A contact that was left with more or less than its stiffness gets back to it while it can give energy up.
+// Back to one contact, at the point that the search found: it gets the springs' mean, and the weight at which
+// it holds the polygon's energy. Its overlap is the least over all directions, not that along the face's
+// normal. What its springs hold less than the polygon's did is booked.
+void ContactStages::settle_left(ContactBlock& block, int lane, const Results& results,
+                                const LeftPolygon& left) {
+  const int a = block.a[lane], b = block.b[lane];
+  const bool touching = results.touching[lane] != 0;
+  const double kn = step_.model != nullptr ? 1 : step_.laws[block.law[lane]].kn;
+  const double full = 0.5 * kn * results.gap[lane] * results.gap[lane];
+  double& weight = block.field[kWeight][lane];
+  weight = touching && left.normal_energy > 0 ? std::min(left.normal_energy / full, kStiffest) : 1;
+  if (step_.model != nullptr) return;
+  double energy = left.normal_energy + left.tangential_energy;
+  ContactState single{};
+  if (touching) {
+    const ContactCoefficients own = scaled(step_.laws[block.law[lane]], weight);
+    take_over(own, results.geometry(lane), motion_of(record(a)), motion_of(record(b)), step_.dt, left.spring,
+              &single);
+    energy -= weight * full + stored_energy(own, single).tangential_spring;
+  }
+  book(energy, a, b);
+  block.set(lane, kStateField, kContactStateSize, &single);
+}
+
+// A contact that was left with more or less than its stiffness gets back to it, as a polygon does.
 void ContactStages::relax_weight(ContactBlock& block, int lane, double gap) {
   double& weight = block.field[kWeight][lane];
   if (weight == 1) return;
@@ -302,12 +323,12 @@ void ContactStages::relax_weight(ContactBlock& block, int lane, double gap) {
     weight = 1;
     return;
   }
-  if (weight < 1) return;
-  const double change = kRelaxation * (1 - weight);
-  weight += change;
-  if (step_.model != nullptr) return;
   ContactState state;
   block.get(lane, kStateField, kContactStateSize, &state);
+  if (weight < 1 && (step_.model != nullptr || !rests(state))) return;
+  const double change = kRelaxation * (1 - weight);
+  weight += change;
+  if (step_.model != nullptr) return;  // what its springs give up is missing at the next step's balance
   const ContactCoefficients& law = step_.laws[block.law[lane]];
   book(-0.5 * change * (law.kn * gap * gap + law.kt * load(state.spring).squaredNorm()), block.a[lane],
        block.b[lane]);
