@@ -21,6 +21,22 @@ ComputeNurbsEnergy::ComputeNurbsEnergy(LAMMPS* lmp, int& iarg, int narg, char** 
   vector = values_;
 }
 
+// What a contact model doesn't tell is in none of the springs: it counts as dissipated, and comes back as
+// negative.
+void ComputeNurbsEnergy::init() {
+  const auto warn = [this](const std::string& user, const nurbs_host::HostModels* models) {
+    const std::string unknown = models != nullptr ? models->unknown_energies() : "";
+    if (unknown.empty() || warned_) return;
+    warned_ = true;
+    nurbs_host::warn(FLERR, lmp,
+                     "Compute nurbs/energy: the models of " + user + " don't tell the energy of" + unknown +
+                         "; it counts as dissipated while it is stored");
+  };
+  if (const PairGranNurbs* pair = PairGranNurbs::find(lmp)) warn("pair gran/nurbs", pair->models());
+  for (const FixWallNurbs* wall : FixWallNurbs::all(lmp))
+    warn(std::string("fix wall/nurbs ") + wall->id, wall->models());
+}
+
 void ComputeNurbsEnergy::compute_vector() {
   invoked_vector = update->ntimestep;
   nurbs::EnergyLedger sum;

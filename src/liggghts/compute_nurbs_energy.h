@@ -20,11 +20,12 @@ class ComputeNurbsEnergy : public Compute {
   ComputeNurbsEnergy(LAMMPS* lmp, int& iarg, int narg, char** arg);
   ~ComputeNurbsEnergy() override { vector = nullptr; }
 
-  void init() override {}
+  void init() override;
   void compute_vector() override;
 
  private:
   double values_[4] = {};
+  bool warned_ = false;
 };
 
 }  // namespace LAMMPS_NS

@@ -296,6 +296,16 @@ void HostModels::build(int narg, char** arg) {
              user_ +
                  ": tangential tan_luding and rolling_friction luding need model luding, edinburgh, "
                  "edinburgh/stiffness or thornton_ning");
+  if (choices[0].chosen.id == host::EDINBURGH) {
+    bool fixed = false;
+    for (int k = 0; k < narg; k += 2)
+      fixed = fixed || (std::strcmp(arg[k], "fixKc") == 0 && std::strcmp(arg[k + 1], "on") == 0);
+    if (!fixed)
+      fail_all(
+          FLERR, lmp_,
+          user_ +
+              ": model edinburgh needs the setting fixKc on; without it the host's model may loop for ever");
+  }
   models_ = std::make_unique<Combination>(lmp_, wall_type_ != 0, choices[0].chosen.id, choices[1].chosen.id,
                                           choices[2].chosen.id, choices[3].chosen.id);
   const std::string wrong = models_->set(narg, arg);
