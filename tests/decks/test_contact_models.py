@@ -1,0 +1,296 @@
+#!/usr/bin/python3
+"""The host's contact models on NURBS bodies: equal to the host's spheres, and to elliptical Hertz theory where bodies
+are none; ranks, restarts, energies, the host's computes, bad input."""
+import dataclasses
+import json
+import math
+import sys
+import unittest
+from pathlib import Path
+
+import numpy as np
+
+sys.path.insert(0, str(Path(__file__).resolve().parent))
+import deck  # noqa: E402
+import models  # noqa: E402
+from models import Ball, Scene  # noqa: E402
+
+# Two balls of unequal size and material that meet each other and the floor, sliding, rolling and spinning.
+PAIR = [Ball(0.01, (0, 0, 0.00999), (0.3, 0.1, -0.4), (5, -8, 3), 2500.0, 1),
+        Ball(0.008, (0.0175, 0.001, 0.0105), (-0.6, 0.2, -0.2), (-10, 4, 20), 2300.0, 2)]
+
+# Every model of every kind at least once, each with several of the others.
+COMBINATIONS = [
+    "hertz tangential history",
+    "hertz tangential no_history cohesion sjkr rolling_friction cdt",
+    "hertz tangential history cohesion sjkr2 rolling_friction epsd",
+    "hertz tangential history cohesion sjkr rolling_friction epsd2 tangential_reduce on",
+    "hertz tangential history rolling_friction epsd3 tangential_damping off limitForce on",
+    "hertz rolling_friction epsd torsionTorque on",
+    "hertz/stiffness tangential history rolling_friction epsd2",
+    "hooke tangential history rolling_friction cdt",
+    "hooke tangential no_history rolling_friction epsd viscous on",
+    "hooke tangential history cohesion sjkr ktToKnUser on",
+    "hooke/stiffness tangential history absolute_damping on",
+    "hooke/stiffness tangential no_history rolling_friction epsd2",
+    "hooke/hysteresis tangential history rolling_friction epsd",
+    "hooke/hysteresis tangential no_history cohesion sjkr",
+    "luding tangential history",
+    "luding tangential tan_luding rolling_friction luding torsion on",
+]
+
+
+def difference(a, b):
+    """Largest difference of positions, velocities and spins in all frames, relative to the largest of their kind."""
+    worst = 0
+    for (step, p), (other, q) in zip(a.frames, b.frames, strict=True):
+        assert step == other
+        for names in (("x", "y", "z"), ("vx", "vy", "vz"), ("omegax", "omegay", "omegaz")):
+            ours, theirs = (np.array([frame[name] for name in names]) for frame in (p, q))
+            worst = max(worst, np.abs(ours - theirs).max() / np.abs(theirs).max())
+    return worst
+
+
+class HostSpheres(unittest.TestCase):
+
+    def test_every_model_moves_nurbs_spheres_as_host_spheres(self):
+        for words in COMBINATIONS:
+            with self.subTest(words):
+                scene = Scene(PAIR, words, floor=True, gravity=9.81)
+                self.assertLess(difference(scene.run("nurbs"), scene.run("sphere")), 1e-12)
+
+    def test_models_that_double_round_off(self):
+        """edinburgh's loads are powers of differences; thornton_ning takes i's radius for the pair's, so equal balls."""
+        equal = [dataclasses.replace(ball, radius=0.009) for ball in PAIR]
+        for words, balls in (("edinburgh tangential history fixKc on", PAIR),
+                             ("edinburgh/stiffness tangential history rolling_friction cdt", PAIR),
+                             ("thornton_ning tangential history", equal)):
+            with self.subTest(words):
+                scene = Scene(balls, words)
+                self.assertLess(difference(scene.run("nurbs"), scene.run("sphere")), 1e-10)
+
+    def test_forces_are_good_to_the_tolerance(self):
+        exact = Scene(PAIR, "hertz tangential history", floor=True, steps=100, every=10)
+        host = exact.run("sphere")
+        for tolerance in (1e-9, 1e-6, 1e-3):
+            ours = dataclasses.replace(exact, tolerance=tolerance).run("nurbs")
+            self.assertLess(difference(ours, host), 10 * tolerance)
+
+    def test_a_frozen_ball(self):
+        scene = Scene(PAIR, "hertz tangential history rolling_friction epsd2",
+                      commands="group still id 2\nfix still still freeze\nvelocity still set 0 0 0")
+        self.assertLess(difference(scene.run("nurbs"), scene.run("sphere")), 1e-12)
+
+    def test_preloaded_library_leaves_host_spheres_alone(self):
+        scene = Scene(PAIR, "hertz tangential history cohesion sjkr rolling_friction epsd2", floor=True, gravity=9.81)
+        plain = scene.run("sphere", program="/usr/bin/liggghts")
+        loaded = scene.run("sphere", program="/usr/bin/liggghts",
+                           env={"LD_PRELOAD": str(deck.BUILD / "libliggghts_nurbs.so")})
+        self.assertEqual(plain.read("out.dump"), loaded.read("out.dump"))
+        self.assertEqual(plain.read("out.dump"), scene.run("sphere").read("out.dump"))
+
+
+# --- bodies that are no spheres
+
+
+def rotation(q):
+    w, x, y, z = q
+    return np.array([[1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+                     [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+                     [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)]])
+
+
+def support(axes, q, d):
+    """Support function of an ellipsoid, its point and its inverse Weingarten map (3 x 3), for unit d."""
+    r = rotation(q)
+    m = r @ np.diag(np.square(axes)) @ r.T
+    h = math.sqrt(d @ m @ d)
+    return h, m @ d / h, m / h - np.outer(m @ d, m @ d) / h**3
+
+
+def curvatures(maps, normal):
+    """Relative principal curvatures, ascending, of surfaces with these inverse Weingarten maps."""
+    t = np.linalg.svd(normal[None])[2][1:].T
+    return np.linalg.eigvalsh(sum(np.linalg.inv(t.T @ w @ t) for w in maps))
+
+
+def elliptic(m):
+    """Complete elliptic integrals K, E of parameter m by the arithmetic-geometric mean."""
+    a, g, c, power, total = 1.0, math.sqrt(1 - m), math.sqrt(m), 0.5, 0.5 * m
+    while abs(c) > 1e-16:
+        a, g, c = (a + g) / 2, math.sqrt(a * g), (a - g) / 2
+        power *= 2
+        total += power * c * c
+    k = math.pi / (2 * a)
+    return k, k * (1 - total)
+
+
+def hertz_force(modulus, k_a, k_b, overlap):
+    """Exact elliptical Hertz contact (Johnson, Contact Mechanics, 4.2): relative curvatures k_a <= k_b."""
+    if k_b / k_a - 1 < 1e-9:
+        return 4 / 3 * modulus * math.sqrt(1 / k_a) * overlap**1.5
+    low, high = 1e-14, 1 - 1e-14  # e^2 of the contact ellipse
+    for _ in range(200):
+        m = (low + high) / 2
+        k, e = elliptic(m)
+        low, high = (m, high) if (e / (1 - m) - k) / (k - e) < k_b / k_a else (low, m)
+    k, e = elliptic(m)
+    a = math.sqrt(overlap * (k - e) / (k_a / 2 * m * k))
+    return 2 / 3 * math.pi * a * modulus * overlap / k
+
+
+@dataclasses.dataclass
+class Body:
+    shape: int
+    x: tuple
+    v: tuple = (0, 0, 0)
+    q: tuple = (1, 0, 0, 0)
+    omega: tuple = (0, 0, 0)
+    density: float = 2500.0
+
+
+PLAIN = {"youngsModulus": 5e6, "poissonsRatio": 0.25, "coefficientRestitution": 1.0, "coefficientFriction": 0.0,
+         "coefficientRollingFriction": 0.1, "coefficientRollingViscousDamping": 0.1, "characteristicVelocity": 1.0,
+         "cohesionEnergyDensity": 1e4}
+MODULUS = 5e6 / (2 * (1 - 0.25**2))  # of two bodies of PLAIN
+
+
+def bodies_deck(bodies, shapes, words, values=PLAIN, floor=False, gravity=0.0, dt=1e-5, steps=0, every=100, commands="",
+                tolerance=1e-12, end=None, box=0.1, radius=""):
+    """A deck of NURBS bodies, all of scale 0.01, and its files. Thermo: energies; dump: motion."""
+    names = [f"shape{k}.json" for k in range(len(shapes))]
+    atoms = [(k + 1, 1, b.shape, 0.01, b.density, *map(float, b.x), *map(float, np.array(b.q) / np.linalg.norm(b.q)))
+             for k, b in enumerate(bodies)]
+    velocities = [(k + 1, *map(float, (*b.v, *b.omega))) for k, b in enumerate(bodies)]
+    files = dict(zip(names, shapes))
+    files["bodies.data"] = deck.data_file(atoms, velocities, ((-box, box), ) * 3)
+    text = ["units si", "atom_style nurbs " + " ".join(names), "boundary f f f", "newton off",
+            "communicate single vel yes", "read_data bodies.data", "neighbor 0.002 bin", "neigh_modify delay 0",
+            models.materials(values, 1), f"pair_style gran/nurbs tolerance {tolerance} {radius} model {words}",
+            "pair_coeff * *"]
+    if floor:
+        text.append(f"fix floor all wall/nurbs plane 0 0 0 0 0 1 type 1 {radius} model {words}")
+    if gravity:
+        text.append(f"fix gravity all gravity {gravity} vector 0 0 -1")
+    text += ["fix move all nve/nurbs", f"timestep {dt!r}", "compute spin all erotate/nurbs",
+             "compute held all nurbs/energy", "compute body all nurbs/atom qw qx qy qz", f"thermo {every}",
+             "thermo_style custom step ke c_spin c_held[1] c_held[2] c_held[3] c_held[4]",
+             "thermo_modify format float %.15g norm no lost error",
+             f"dump d all custom {every} out.dump {models.DUMPED} c_body[1] c_body[2] c_body[3] c_body[4]",
+             'dump_modify d format "%d' + " %.17g" * 19 + '"', commands, end or f"run {steps}"]
+    return "\n".join(text) + "\n", files
+
+
+def run_bodies(*arguments, ranks=1, **options):
+    text, files = bodies_deck(*arguments, **options)
+    run = deck.run_ok(text, ranks=ranks, files=files)
+    run.frames = run.dump("out.dump")
+    return run
+
+
+def unit(*q):
+    return tuple(np.array(q) / np.linalg.norm(q))
+
+
+class EllipticalHertz(unittest.TestCase):
+    """Forces against elliptic integrals; the fit of the effective radius is good to 6e-5."""
+
+    def test_on_a_plane(self):
+        down = np.array([0, 0, -1.0])
+        for axes, q in (((1, 1, 1), (1, 0, 0, 0)), ((1.25, 1, 0.8), (1, 0, 0, 0)), ((1.25, 1, 0.8), unit(3, 1, -2, 4)),
+                        ((2, 1, 1), (1, 0, 0, 0)), ((2, 1, 1), unit(1, 0, 1, 0)), ((3, 1, 1.5), unit(2, 2, -1, 3))):
+            with self.subTest(axes=axes, q=q):
+                h, _, w = support(axes, q, down)
+                overlap = 2e-5
+                run = run_bodies([Body(1, (0, 0, 0.01 * h - overlap), q=q)], [models.ellipsoid(*map(float, axes))],
+                                 "hertz tangential history", floor=True)
+                force = hertz_force(MODULUS, *curvatures([0.01 * w], down), overlap)
+                self.assertAlmostEqual(run.frames[0][1]["fz"][0] / force, 1, delta=7e-5)
+
+    def test_of_two_ellipsoids(self):
+        axes, q = ((1.25, 1, 0.8), (2, 1, 1.2)), (unit(3, 1, -2, 4), unit(1, -2, 2, 5))
+        d = np.array(unit(2, -1, 2))
+        (ha, pa, wa), (hb, pb, wb) = (support(axes[k], q[k], side) for k, side in enumerate((d, -d)))
+        overlap = 2e-5  # along d, which stays the normal: the points lie on it
+        apart = 0.01 * (pa - pb) - overlap * d
+        run = run_bodies([Body(1, (0, 0, 0), q=q[0]), Body(2, tuple(apart), q=q[1])],
+                         [models.ellipsoid(*map(float, a)) for a in axes], "hertz tangential history")
+        force = hertz_force(MODULUS, *curvatures([0.01 * wa, 0.01 * wb], d), overlap)
+        f = np.array([run.frames[0][1][name][1] for name in ("fx", "fy", "fz")])
+        self.assertAlmostEqual(f @ d / force, 1, delta=7e-5)
+        self.assertLess(np.linalg.norm(f - f @ d * d), 1e-6 * force)
+
+    def test_flat_and_volume_radii(self):
+        """A face on a plane has the bounding radius; `radius volume` that of the ball of equal volume."""
+        overlap = 2e-5
+        box = deck.box_shape(1.0, 0.8, 0.6)
+        run = run_bodies([Body(1, (0, 0, 0.006 - overlap))], [box], "hertz tangential history", floor=True)
+        radius = 0.01 * math.sqrt(1 + 0.64 + 0.36)
+        self.assertAlmostEqual(run.frames[0][1]["fz"][0] / (4 / 3 * MODULUS * math.sqrt(radius) * overlap**1.5), 1,
+                               delta=1e-6)
+        run = run_bodies([Body(1, (0, 0, 0.008 - overlap))], [models.ellipsoid(1.25, 1.0, 0.8)], "hertz", floor=True,
+                         radius="radius volume")
+        self.assertAlmostEqual(run.frames[0][1]["fz"][0] / (4 / 3 * MODULUS * math.sqrt(0.01) * overlap**1.5), 1,
+                               delta=1e-6)
+
+
+class Energy(unittest.TestCase):
+
+    def test_elastic_collisions_keep_it(self):
+        """Ellipsoids that tumble against the floor and each other, without damping and friction."""
+        q = unit(3, 1, -2, 4)
+        cases = {"floor": dict(bodies=[Body(1, (0, 0, 0.019), (0.1, 0, -0.5), q, (20, -30, 10))], floor=True),
+                 "pair": dict(bodies=[Body(1, (0, 0, 0), (0, 0, 0.4), q, (5, 20, -10)),
+                                      Body(2, (0.003, -0.002, 0.028), (0, 0, -0.4), unit(1, -2, 2, 5), (9, -9, 30))])}
+        shapes = [models.ellipsoid(2.0, 1.0, 1.0), models.ellipsoid(1.25, 1.0, 0.8)]
+        for name, scene in cases.items():
+            for words in ("hertz", "hooke tangential history", "hertz tangential no_history cohesion sjkr2"):
+                with self.subTest(name, words=words):
+                    run = run_bodies(scene["bodies"], shapes[:2], words, floor=scene.get("floor", False), dt=2e-6,
+                                     steps=8000, every=200)
+                    t = run.thermo
+                    kinetic = t["KinEng"] + t["spin"]
+                    total = kinetic + t["held[1]"] + t["held[2]"]
+                    self.assertGreater(t["held[1]"].max(), 1e-2 * kinetic[0])  # they have met
+                    self.assertEqual(t["held[1]"][-1], 0)
+                    self.assertLess(abs(kinetic[-1] / kinetic[0] - 1), 1e-6)
+                    self.assertLess(np.abs(total / total[0] - 1).max(), 1e-4)
+
+    def test_ledger_closes_with_everything_on(self):
+        """Damping, friction, rolling: the error of the sum falls with the square of the time step."""
+        values = {**PLAIN, "coefficientRestitution": 0.5, "coefficientFriction": 0.4}
+        body = Body(1, (0, 0, 0.0145), (0.4, 0.1, -0.5), unit(3, 1, -2, 4), (20, -30, 10))
+        errors = []
+        for dt in (8e-6, 4e-6):
+            run = run_bodies([body], [models.ellipsoid(1.25, 1.0, 0.8)],
+                             "hertz tangential history rolling_friction epsd2", values, floor=True, gravity=9.81, dt=dt,
+                             steps=round(0.1 / dt), every=round(0.1 / dt) // 50)
+            t = run.thermo
+            mass = 4 / 3 * math.pi * 1e-6 * 2500
+            height = np.array([frame["z"][0] for _, frame in run.frames])
+            total = sum(t[name] for name in ("KinEng", "spin", "held[1]", "held[2]", "held[3]", "held[4]"))
+            total = total + mass * 9.81 * height
+            lost = t["held[3]"][-1] + t["held[4]"][-1]
+            self.assertGreater(lost, 0.3 * (t["KinEng"] + t["spin"])[0])
+            self.assertGreater(t["held[4]"][-1], 0)
+            errors.append(np.abs(total - total[0]).max() / total[0])
+        self.assertLess(errors[0], 1e-3)
+        self.assertLess(errors[1], 0.5 * errors[0])
+
+    def test_a_box_comes_to_rest_on_its_face(self):
+        values = {**PLAIN, "coefficientRestitution": 0.3, "coefficientFriction": 0.5}
+        box = deck.box_shape(1.0, 0.8, 0.6)
+        run = run_bodies([Body(1, (0, 0, 0.008), (0.02, 0, 0), unit(1, 0.1, 0.05, 0.02))], [box],
+                         "hertz tangential history", values, floor=True, gravity=9.81, dt=1e-5, steps=40000, every=4000)
+        mass, radius = 8 * 0.48e-6 * 2500, 0.01 * math.sqrt(2)
+        overlap = (mass * 9.81 / (4 / 3 * MODULUS * math.sqrt(radius)))**(2 / 3)
+        last = run.frames[-1][1]
+        self.assertAlmostEqual((0.006 - last["z"][0]) / overlap, 1, delta=1e-2)
+        self.assertAlmostEqual(last["fz"][0] / (mass * 9.81), 0, delta=1e-2)
+        speeds = np.array([[last[name][0] for name in ("vx", "vy", "vz", "omegax", "omegay", "omegaz")]])
+        self.assertLess(np.abs(speeds[:, :3]).max(), 1e-6)
+        self.assertLess(np.abs(speeds[:, 3:]).max(), 1e-4)
+
+
+if __name__ == "__main__":
+    unittest.main()
