@@ -1,0 +1,361 @@
+// See surface_search.h.
+#include "contact/surface_search.h"
+
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
+#include "nurbs/tolerances.h"
+
+namespace nurbs {
+namespace {
+
+constexpr double kSameNormal = 0.9;  // cosine: a former contact this near has a start for the search
+
+// A plane that the body overlaps.
+struct ActivePlane {
+  bool active = false;
+  Vec3 normal;   // towards the body
+  Vec3 deepest;  // the body's point, relative to its centre
+  ContactResult result;
+  PairMemory memory;
+};
+
+// An edge as the body meets it.
+struct MetEdge {
+  enum State { unknown, clear, along, before, beyond } state = unknown;  // beyond: past v[1]
+};
+
+// Room that is used again by every search of a thread.
+struct Workspace {
+  std::vector<ActivePlane> planes;
+  std::vector<MetEdge> edges;
+};
+Workspace& workspace() {
+  static thread_local Workspace w;
+  return w;
+}
+
+class SurfaceSearch {
+ public:
+  SurfaceSearch(const Particle& particle, MeshPatch& patch, const ContactSettings& settings, double path,
+                const FormerContact* former, int former_count, SurfaceContacts* out)
+      : particle_(particle),
+        patch_(patch),
+        settings_(settings),
+        path_(path),
+        radius_(particle.scale * particle.shape->bounding_radius),
+        former_(former),
+        former_count_(former_count),
+        out_(*out),
+        planes_(workspace().planes),
+        edges_(workspace().edges) {}
+
+  void run() {
+    out_.count = 0;
+    out_.full = false;
+    planes_.resize(std::max(planes_.size(), patch_.planes().size()));
+    bool any = false;
+    for (std::size_t p = 0; p < patch_.planes().size(); ++p) any = look_at_plane(static_cast<int>(p)) || any;
+    if (any) {
+      for (std::size_t p = 0; p < patch_.planes().size(); ++p)
+        if (planes_[p].active) touch_face(static_cast<int>(p));
+      edges_.assign(patch_.edges().size(), MetEdge{});
+      for (std::size_t e = 0; e < edges_.size(); ++e) touch_edge(static_cast<int>(e));
+      for (std::size_t v = 0; v < patch_.vertices().size(); ++v) touch_vertex(static_cast<int>(v));
+    }
+    out_.expiry = kFarAway;
+    for (const MeshPatch::Plane& plane : patch_.planes()) out_.expiry = std::min(out_.expiry, plane.expiry);
+    if (out_.count > 0) out_.expiry = -kFarAway;
+  }
+
+ private:
+  const PairMemory* start_for(const Vec3& normal) const {
+    const PairMemory* best = nullptr;
+    double most = kSameNormal;
+    for (int k = 0; k < former_count_; ++k) {
+      const double cosine = former_[k].normal.dot(normal);
+      if (cosine > most) most = cosine, best = former_[k].memory;
+    }
+    return best;
+  }
+  const SurfacePoint* point_for(const Vec3& normal, SurfacePoint* point) const {
+    const PairMemory* memory = start_for(normal);
+    if (!memory || !(memory->on_b.patch >= 0)) return nullptr;
+    *point = {static_cast<int>(memory->on_b.patch), memory->on_b.u, memory->on_b.v};
+    return point;
+  }
+
+  // The ladder of a plane; true if the body overlaps it.
+  bool look_at_plane(int number) {
+    MeshPatch::Plane& plane = patch_.planes()[number];
+    ActivePlane& met = planes_[number];
+    met.active = false;
+    if (path_ < plane.expiry) return false;
+    const double height = plane.normal.dot(particle_.x - plane.origin);
+    if (std::abs(height) > radius_) {
+      plane.expiry = path_ + (1 - 1e-12) * (std::abs(height) - radius_);
+      return false;
+    }
+    met.normal = height < 0 ? Vec3(-plane.normal) : plane.normal;
+    PairMemory& memory = met.memory;
+    if (const PairMemory* from = start_for(met.normal)) {
+      memory = *from;
+      const std::uint64_t name = pair_stamp(stamp(met.normal), stamp(particle_), Solver::ladder);
+      if (memory.proof.stamp != name) {  // another plane: only where to start is worth keeping
+        memory.proof.stamp = name;
+        drop_proof(&memory.proof);
+        drop_model(&memory.model);
+      }
+      memory.proof.contact = 1;
+    } else {
+      memory = PairMemory{};
+    }
+    met.result = find_plane_contact(particle_, plane.origin, met.normal, settings_,
+                                    reinterpret_cast<double*>(&memory));
+    const ContactResult& r = met.result;
+    if (r.status == Status::separated || !(r.gap < 0)) {
+      if (r.lower > 0) plane.expiry = path_ + (1 - 1e-12) * r.lower;
+      return false;
+    }
+    met.deepest = r.point_b;
+    met.active = true;
+    return true;
+  }
+
+  // How far the plane's deepest point of the body is on the side of an edge to which `sign` belongs.
+  double inside(const ActivePlane& met, const MeshPatch::Plane& plane, const MeshPatch::Edge& e) const {
+    const Vec3 x = particle_.x - patch_.vertices()[e.v[0]].x + met.deepest;
+    return plane.normal.cross(e.direction).dot(x);
+  }
+  double sign_of(int edge, int cell) const {
+    const MeshPatch::Edge& e = patch_.edges()[edge];
+    for (int i = e.first_side; i < e.first_side + e.sides; ++i)
+      if (patch_.side(i).cell == cell) return patch_.side(i).sign;
+    return 0;
+  }
+
+  // Whether a cell has the deepest point. Borders of the plane are no part of it, cuts within it are.
+  bool holds(int number, const ActivePlane& met) const {
+    const MeshPatch::Cell& cell = patch_.cells()[number];
+    const MeshPatch::Plane& plane = patch_.planes()[cell.plane];
+    for (int k = 0; k < cell.corners; ++k) {
+      const int edge = patch_.edge_of(cell.first + k);
+      const MeshPatch::Edge& e = patch_.edges()[edge];
+      const double s = sign_of(edge, number) * inside(met, plane, e);
+      if (!(e.inner ? s >= 0 : s > 0)) return false;
+    }
+    return true;
+  }
+
+  void touch_face(int number) {
+    const MeshPatch::Plane& plane = patch_.planes()[number];
+    const ActivePlane& met = planes_[number];
+    int triangle = patch_.unbounded() ? 0 : -1;
+    for (int i = 0; i < plane.cells && triangle < 0; ++i) {
+      const int cell = patch_.cell_in(plane.first + i);
+      if (holds(cell, met)) triangle = patch_.cells()[cell].triangle;
+    }
+    if (triangle < 0) return;
+    SurfaceContact c;
+    c.gap = met.result.gap;
+    c.normal = met.normal;
+    c.on_body = met.deepest;
+    c.triangle = triangle;
+    c.plane = number;
+    c.rung = met.result.rung;
+    c.iterations = met.result.iterations;
+    c.converged = met.result.status == Status::converged;
+    c.memory = met.memory;
+    out_.add(c);
+  }
+
+  // Directions around an edge between which the contact's lies: the slope of f, when d turns about the edge,
+  // changes from rising to falling there.
+  struct Range {
+    Vec3 low, high;
+  };
+  bool range(const MeshPatch::Edge& e, Range* r) const {
+    const Vec3 a = patch_.vertices()[e.v[0]].x;
+    const ActivePlane& first = planes_[patch_.cells()[patch_.side(e.first_side).cell].plane];
+    double low = -kFarAway, high = kFarAway;
+    for (int i = e.first_side; i < e.first_side + e.sides; ++i) {
+      const ActivePlane& met = planes_[patch_.cells()[patch_.side(i).cell].plane];
+      const double angle =
+          std::atan2(e.direction.dot(first.normal.cross(met.normal)), first.normal.dot(met.normal));
+      const double slope = e.direction.cross(met.normal).dot(particle_.x - a + met.deepest);
+      if (slope > 0) {
+        if (angle > low) low = angle, r->low = met.normal;
+      } else if (angle < high) {
+        high = angle;
+        r->high = met.normal;
+      }
+    }
+    if (low > -kFarAway && high < kFarAway) return high >= low;
+    // A border: the direction turns outward, to the side at most.
+    if (low > -kFarAway)
+      r->high = e.direction.cross(r->low);
+    else
+      r->low = -e.direction.cross(r->high);
+    return true;
+  }
+
+  bool all_active(const MeshPatch::Edge& e) const {
+    for (int i = e.first_side; i < e.first_side + e.sides; ++i)
+      if (!planes_[patch_.cells()[patch_.side(i).cell].plane].active) return false;
+    return true;
+  }
+
+  void touch_edge(int number) {
+    const MeshPatch::Edge& e = patch_.edges()[number];
+    if (e.inner || !all_active(e)) return;
+    int weight = 1;
+    for (int i = e.first_side; i < e.first_side + e.sides; ++i) {
+      const MeshPatch::Side& side = patch_.side(i);
+      const int plane = patch_.cells()[side.cell].plane;
+      if (side.sign * inside(planes_[plane], patch_.planes()[plane], e) > 0) --weight;
+    }
+    if (weight == 0) return;
+    const Vec3& a = patch_.vertices()[e.v[0]].x;
+    const Vec3 apart = particle_.x - a;
+    if ((apart - apart.dot(e.direction) * e.direction).squaredNorm() > radius_ * radius_) return;
+    Range r;
+    if (!range(e, &r)) return;
+    SurfacePoint start;
+    const FeatureContact f =
+        find_line_contact(particle_, a, e.direction, r.low, r.high, 0, point_for(r.low, &start));
+    MetEdge& met = edges_[number];
+    met.state = !f.touching             ? MetEdge::clear
+                : !(f.along > 0)        ? MetEdge::before
+                : !(f.along < e.length) ? MetEdge::beyond
+                                        : MetEdge::along;
+    if (met.state != MetEdge::along) return;
+    if (e.sides == 1 && covered(f, patch_.side(e.first_side).cell)) return;
+    add_feature(f, weight, patch_.cells()[patch_.side(e.first_side).cell].triangle);
+  }
+
+  // Whether a point of a border lies within another cell: meshes that overlap themselves have no border
+  // there.
+  bool covered(const FeatureContact& f, int own) const {
+    const Vec3 y = particle_.x + f.on_body - f.gap * f.normal;
+    for (std::size_t c = 0; c < patch_.cells().size(); ++c) {
+      const MeshPatch::Cell& cell = patch_.cells()[c];
+      if (static_cast<int>(c) == own || !planes_[cell.plane].active) continue;
+      const MeshPatch::Plane& plane = patch_.planes()[cell.plane];
+      if (std::abs(plane.normal.dot(y - plane.origin)) > kWithin * radius_) continue;
+      bool in = true;
+      for (int k = 0; k < cell.corners && in; ++k) {
+        const int edge = patch_.edge_of(cell.first + k);
+        const MeshPatch::Edge& e = patch_.edges()[edge];
+        const double s = plane.normal.cross(e.direction).dot(y - patch_.vertices()[e.v[0]].x);
+        in = sign_of(edge, static_cast<int>(c)) * s > -kWithin * radius_;
+      }
+      if (in) return true;
+    }
+    return false;
+  }
+
+  void touch_vertex(int number) {
+    const MeshPatch::Vertex& v = patch_.vertices()[number];
+    if (v.inner || v.cells == 0) return;
+    if ((particle_.x - v.x).squaredNorm() > radius_ * radius_) return;
+    const ActivePlane* shallowest = nullptr;
+    int first_plane = -1;
+    bool corner = false;  // else one straight line and one plane: the edges say all
+    for (int i = 0; i < v.cells; ++i) {
+      const int plane = patch_.cells()[patch_.cell_at(v.first_cell + i)].plane;
+      const ActivePlane& met = planes_[plane];
+      if (!met.active) return;
+      if (!shallowest || met.result.gap > shallowest->result.gap) shallowest = &met;
+      if (first_plane < 0) first_plane = plane;
+      corner = corner || plane != first_plane;
+    }
+    for (int i = 0; i < v.edges; ++i)
+      if (edges_[patch_.edge_at(v.first_edge + i)].state == MetEdge::clear) return;
+    (void)corner;
+    SurfacePoint start;
+    const FeatureContact f =
+        find_point_contact(particle_, v.x, shallowest->normal, point_for(shallowest->normal, &start));
+    if (!f.touching) return;
+    int weight = 1;
+    for (int i = 0; i < v.edges; ++i) {
+      const int e = patch_.edge_at(v.first_edge + i);
+      if (climbs(e, number, f.normal)) weight -= 1 - patch_.edges()[e].sides;
+    }
+    for (int i = 0; i < v.cells; ++i)
+      if (cell_climbs(patch_.cell_at(v.first_cell + i), number, f.normal)) --weight;
+    if (weight == 0) return;
+    add_feature(f, weight, patch_.cells()[patch_.cell_at(v.first_cell)].triangle);
+  }
+
+  // Whether an edge climbs along d from its end at a vertex; by where the body met the edge, if it did.
+  bool climbs(int edge, int vertex, const Vec3& d) const {
+    const MeshPatch::Edge& e = patch_.edges()[edge];
+    const bool first = e.v[0] == vertex;
+    switch (edges_[edge].state) {
+      case MetEdge::along:
+        return true;
+      case MetEdge::before:
+        return !first;
+      case MetEdge::beyond:
+        return first;
+      default:
+        return (first ? 1 : -1) * e.direction.dot(d) > 0;
+    }
+  }
+  bool cell_climbs(int number, int vertex, const Vec3& d) const {
+    const MeshPatch::Cell& cell = patch_.cells()[number];
+    for (int k = 0; k < cell.corners; ++k) {
+      if (patch_.corner(cell.first + k) != vertex) continue;
+      const int before = patch_.edge_of(cell.first + (k + cell.corners - 1) % cell.corners);
+      return climbs(patch_.edge_of(cell.first + k), vertex, d) || climbs(before, vertex, d);
+    }
+    return false;
+  }
+
+  void add_feature(const FeatureContact& f, int weight, int triangle) {
+    SurfaceContact c;
+    c.weight = weight;
+    c.gap = f.gap;
+    c.normal = f.normal;
+    c.on_body = f.on_body;
+    c.triangle = triangle;
+    c.rung = Rung::warm;
+    c.memory = PairMemory{};
+    drop_proof(&c.memory.proof);
+    drop_model(&c.memory.model);
+    c.memory.on_a.patch = -1;
+    c.memory.on_b = {static_cast<double>(f.where.patch), f.where.u, f.where.v, {0, 0}};
+    c.memory.proof.stamp = 1;
+    out_.add(c);
+  }
+
+  static constexpr double kWithin = 1e-9;  // of the bounding radius: on a cell
+
+  const Particle& particle_;
+  MeshPatch& patch_;
+  const ContactSettings& settings_;
+  const double path_, radius_;
+  const FormerContact* former_;
+  const int former_count_;
+  SurfaceContacts& out_;
+  std::vector<ActivePlane>& planes_;
+  std::vector<MetEdge>& edges_;
+};
+
+}  // namespace
+
+void SurfaceContacts::add(const SurfaceContact& c) {
+  if (count == kSurfaceContacts) {
+    full = true;
+    return;
+  }
+  contact[count++] = c;
+}
+
+void find_surface_contacts(const Particle& particle, MeshPatch& patch, const ContactSettings& settings,
+                           double path, const FormerContact* former, int former_count, SurfaceContacts* out) {
+  SurfaceSearch(particle, patch, settings, path, former, former_count, out).run();
+}
+
+}  // namespace nurbs

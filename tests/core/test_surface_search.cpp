@@ -1,0 +1,229 @@
+// Contacts of a body with a triangle mesh against brute force over directions, piece by piece; and what must
+// not depend on how the mesh is cut.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <functional>
+#include <map>
+#include <set>
+
+#include "contact/surface_search.h"
+#include "support/bodies.h"
+#include "support/random.h"
+
+namespace nurbs {
+namespace {
+
+using test::Random;
+
+// The point of a triangle, segment or point nearest to c.
+Vec3 nearest(const std::vector<Vec3>& hull, const Vec3& c) {
+  const auto on_segment = [&](const Vec3& a, const Vec3& b) -> Vec3 {
+    const double t = (c - a).dot(b - a) / (b - a).squaredNorm();
+    return a + std::clamp(t, 0.0, 1.0) * (b - a);
+  };
+  if (hull.size() == 1) return hull[0];
+  if (hull.size() == 2) return on_segment(hull[0], hull[1]);
+  const Vec3 n = (hull[1] - hull[0]).cross(hull[2] - hull[0]).normalized();
+  const Vec3 foot = c - n.dot(c - hull[0]) * n;
+  bool inside = true;
+  Vec3 best = hull[0];
+  for (int k = 0; k < 3; ++k) {
+    const Vec3 &p = hull[k], &q = hull[(k + 1) % 3];
+    inside = inside && n.cross(q - p).dot(foot - p) >= 0;
+    const Vec3 y = on_segment(p, q);
+    if ((y - c).norm() < (best - c).norm()) best = y;
+  }
+  return inside ? foot : best;
+}
+
+// Signed distance of a point from a body's surface, < 0 inside, by compass search over directions from d.
+double brute_point_gap(const Particle& p, const Vec3& y, Vec3* d, double step) {
+  const Mat3 axes = p.q.toRotationMatrix();
+  const auto gap = [&](const Vec3& u) {
+    return u.dot(p.x - y) - p.scale * find_support(*p.shape, axes.transpose() * -u).h;
+  };
+  double most = gap(*d);
+  for (; step > 1e-8; step *= 0.4)
+    for (bool better = true; better;) {
+      better = false;
+      const Vec3 t = d->unitOrthogonal(), s = d->cross(t);
+      for (const Vec3& side : {t, s, Vec3(-t), Vec3(-s)}) {
+        const Vec3 u = (*d + step * side).normalized();
+        const double g = gap(u);
+        if (g > most) most = g, *d = u, better = true;
+      }
+    }
+  return most;
+}
+
+// Gap between a body and the convex hull of some points, by alternating projections between the hull and the
+// body's core: what is left of the body when its surface moves in by less than its curvature radii.
+double brute_gap(const Particle& p, const std::vector<Vec3>& hull) {
+  const double depth = 0.5 * p.scale * p.shape->patch_curvature.min_radius;
+  Vec3 y = nearest(hull, p.x), d = (p.x - y).normalized();
+  if ((p.x - y).norm() > p.scale * p.shape->bounding_radius) return 1;
+  double gap = brute_point_gap(p, y, &d, 0.2);
+  for (int k = 0; k < 400; ++k) {
+    if (gap > 0.2) return 1;
+    const Vec3 next = nearest(hull, y + (gap + depth) * d);
+    const double moved = (next - y).norm();
+    y = next;
+    gap = brute_point_gap(p, y, &d, 2 * moved + 1e-7);
+    if (moved < 1e-9) break;
+  }
+  return gap;
+}
+
+double phi(double gap) {
+  return gap < 0 ? 0.5 * gap * gap : 0;
+}
+
+struct Mesh {
+  std::vector<Triangle> triangles;
+  void add(const Vec3& a, const Vec3& b, const Vec3& c) { triangles.push_back({a, b, c}); }
+};
+
+// U by inclusion and exclusion over all triangles, edges and vertices.
+double brute_energy(const Particle& p, const Mesh& mesh) {
+  std::vector<Vec3> points;
+  const auto number = [&](const Vec3& x) {
+    for (std::size_t k = 0; k < points.size(); ++k)
+      if ((points[k] - x).norm() < 1e-9) return static_cast<int>(k);
+    points.push_back(x);
+    return static_cast<int>(points.size()) - 1;
+  };
+  std::map<std::pair<int, int>, int> edges;
+  std::map<int, int> coefficient;
+  double sum = 0;
+  for (const Triangle& t : mesh.triangles) {
+    int n[3];
+    for (int k = 0; k < 3; ++k) n[k] = number(t[k]);
+    for (int k = 0; k < 3; ++k) {
+      ++edges[{std::min(n[k], n[(k + 1) % 3]), std::max(n[k], n[(k + 1) % 3])}];
+      coefficient.emplace(n[k], 1).first->second -= 1;
+    }
+    sum += phi(brute_gap(p, {t[0], t[1], t[2]}));
+  }
+  for (const auto& [ends, count] : edges) {
+    for (const int v : {ends.first, ends.second}) coefficient[v] -= 1 - count;
+    if (count != 1) sum += (1 - count) * phi(brute_gap(p, {points[ends.first], points[ends.second]}));
+  }
+  for (const auto& [v, c] : coefficient)
+    if (c != 0) sum += c * phi(brute_gap(p, {points[v]}));
+  return sum;
+}
+
+struct Sum {
+  double energy = 0;
+  Vec3 force = Vec3::Zero(), torque = Vec3::Zero();
+  int count = 0, negative = 0;
+};
+
+Sum search(const Particle& p, const Mesh& mesh) {
+  MeshPatch patch;
+  patch.build(mesh.triangles.data(), static_cast<int>(mesh.triangles.size()), 1e-7);
+  ContactSettings settings;
+  settings.reach = 0;
+  SurfaceContacts contacts;
+  find_surface_contacts(p, patch, settings, 0, nullptr, 0, &contacts);
+  Sum s;
+  s.count = contacts.count;
+  for (int k = 0; k < contacts.count; ++k) {
+    const SurfaceContact& c = contacts.contact[k];
+    s.energy += c.weight * phi(c.gap);
+    const Vec3 force = -c.weight * c.gap * c.normal;
+    s.force += force;
+    s.torque += (c.on_body - 0.5 * c.gap * c.normal).cross(force);
+    s.negative += c.weight < 0;
+  }
+  return s;
+}
+
+// A sheet over a grid in x and y, each square cut along one of its diagonals.
+Mesh sheet(int n, double size, const std::function<double(double, double)>& height, Random& random) {
+  Mesh mesh;
+  const auto at = [&](int i, int j) {
+    const double x = size * (2.0 * i / n - 1), y = size * (2.0 * j / n - 1);
+    return Vec3(x, y, height(x, y));
+  };
+  for (int i = 0; i < n; ++i)
+    for (int j = 0; j < n; ++j) {
+      const Vec3 a = at(i, j), b = at(i + 1, j), c = at(i + 1, j + 1), d = at(i, j + 1);
+      if (random.below(2)) {
+        mesh.add(a, b, c);
+        mesh.add(a, c, d);
+      } else {
+        mesh.add(a, b, d);
+        mesh.add(b, c, d);
+      }
+    }
+  return mesh;
+}
+
+// Every triangle into three at a random place, some into two.
+Mesh cut(const Mesh& mesh, Random& random) {
+  Mesh fine;
+  for (const Triangle& t : mesh.triangles) {
+    const double a = random.uniform(0.1, 0.8), b = random.uniform(0.1, 0.9 - a);
+    const Vec3 middle = t[0] + a * (t[1] - t[0]) + b * (t[2] - t[0]);
+    for (int k = 0; k < 3; ++k) fine.add(t[k], t[(k + 1) % 3], middle);
+  }
+  return fine;
+}
+
+std::vector<test::ShapePointer> bodies() {
+  return {test::sphere(), test::ellipsoid(), test::smooth_pebble()};
+}
+
+// A body moved down on the mesh until it overlaps by about `depth` somewhere.
+Particle pressed(const test::ShapePointer& shape, const Mesh& mesh, double depth, Random& random,
+                 double spread) {
+  Particle p;
+  p.shape = shape.get();
+  p.q = random.turn();
+  p.x = Vec3(random.uniform(-spread, spread), random.uniform(-spread, spread), 3);
+  const auto gap = [&](double z) {
+    p.x[2] = z;
+    double least = 1e300;
+    for (const Triangle& t : mesh.triangles) least = std::min(least, brute_gap(p, {t[0], t[1], t[2]}));
+    return least;
+  };
+  // The least gap is at most the height above the mesh: step down by it.
+  double z = 3;
+  for (int k = 0; k < 30; ++k) {
+    const double g = gap(z) + depth;
+    if (std::abs(g) < 1e-3 * depth) break;
+    z -= std::min(g, 0.15);
+  }
+  p.x[2] = z;
+  return p;
+}
+
+TEST(SurfaceSearch, EnergyIsInclusionAndExclusionOverThePieces) {
+  Random random(1);
+  int tried = 0, negative = 0, several = 0;
+  for (const auto& shape : bodies())
+    for (int round = 0; round < 25; ++round) {
+      const double steep = random.log_uniform(0.002, 0.4);
+      std::map<std::pair<double, double>, double> heights;
+      const Mesh mesh = sheet(
+          4, 1.6,
+          [&](double x, double y) {
+            return heights.emplace(std::make_pair(x, y), random.uniform(-steep, steep)).first->second;
+          },
+          random);
+      const Particle p = pressed(shape, mesh, random.log_uniform(1e-3, 3e-2), random, 0.5);
+      const Sum s = search(p, mesh);
+      const double truth = brute_energy(p, mesh);
+      ++tried;
+      several += s.count > 1;
+      negative += s.negative > 0;
+      EXPECT_NEAR(s.energy, truth, 1e-6 * truth + 1e-11)
+          << shape->name << " round " << round << " contacts " << s.count << " negative " << s.negative;
+    }
+  std::printf("%d poses, %d with several contacts, %d with negative ones\n", tried, several, negative);
+}
+
+}  // namespace
+}  // namespace nurbs
