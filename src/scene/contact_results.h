@@ -17,6 +17,10 @@ inline BodyMotion motion_of(const BodyRecord& r) {
   return m;
 }
 
+// The state of a contact that takes over from others: their spring, and no dissipation to be finished.
+void take_over(const ContactCoefficients& law, const ContactGeometry& g, const BodyMotion& a,
+               const BodyMotion& b, double dt, const Vec3& spring, ContactState* state);
+
 // Geometry in lab axes from A's centre of mass.
 struct alignas(64) ContactStages::Results {
   double gap[kBlock], lower[kBlock];

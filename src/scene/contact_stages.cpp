@@ -120,7 +120,7 @@ void ContactStages::set_law(int k) {
 
 ContactCoefficients ContactStages::coefficients(const ContactBlock& block, int lane) const {
   if (step_.model != nullptr) return {};
-  return scaled(step_.laws[block.law[lane]], block.field[kWeight][lane]);
+  return scaled(step_.laws[block.law[lane]], std::abs(block.field[kWeight][lane]));
 }
 
 double ContactStages::path(int k) const {
@@ -296,6 +296,14 @@ void ContactStages::count(const ContactResult& r, int a, int b) {
 // ---------------------------------------------------------------------------------------
 
 void ContactStages::compute(const Step& step) {
+  begin_step(step);
+  if (renewed_ || step.bodies->reshaped() || step.setup) check_stamps();
+  renewed_ = false;
+  check_budgets();
+  end_step(neighbour_weight_);
+}
+
+void ContactStages::begin_step(const Step& step) {
   step_ = step;
   counts_ = ContactCounts{};
   deep_ = DeepContacts{};
@@ -305,16 +313,16 @@ void ContactStages::compute(const Step& step) {
   loaded_.clear();
   if (static_cast<int>(sums_.size()) < step.owned) sums_.resize(step.owned, Accumulator{});
   wall_sum_ = Accumulator{};
-  if (renewed_ || step.bodies->reshaped() || step.setup) check_stamps();
-  renewed_ = false;
-  check_budgets();
+}
+
+void ContactStages::end_step(double neighbours) {
   for (ContactBlock& block : pool_.blocks())
     if (block.used != 0) compute_block(block);
 
   double others = 0;
   for (int n = ContactCounts::bounds; n <= ContactCounts::fallback; ++n) others += counts_.value[n];
-  counts_.value[ContactCounts::neighbours] = neighbour_weight_;
-  counts_.value[ContactCounts::safe] = std::max(0.0, neighbour_weight_ - others);
+  counts_.value[ContactCounts::neighbours] = neighbours;
+  counts_.value[ContactCounts::safe] = std::max(0.0, neighbours - others);
 }
 
 // Stage (c) for the contacts first to first + kWidth - 1.
@@ -464,13 +472,14 @@ void ContactStages::start_run(ContactBlock& block, int lane, const Results& resu
   if (state.active == 0) {
     return;
   }
-  const Vec3 force = force_on_b(state);
+  const double sign = block.field[kWeight][lane] < 0 ? -1 : 1;
+  const Vec3 force = sign * force_on_b(state);
   double load_b[8], load_a[8];
   store(force, load_b);
   store(Vec3(load(state.arm_b).cross(force)), load_b + 3);
   store(Vec3(-force), load_a);
   store(Vec3(-load(state.arm_a).cross(force)), load_a + 3);
-  load_a[6] = load_b[6] = state.normal_force;
+  load_a[6] = load_b[6] = sign * state.normal_force;
   load_a[7] = load_b[7] = 1;
   add_load(a, load_a);
   add_load(b, load_b);
@@ -486,7 +495,7 @@ void ContactStages::close(ContactBlock& block, int lane) {
   if (step_.ledger) {
     EnergyLedger work;
     end_contact(coefficients(block, lane), motion_of(record(a)), motion_of(record(b)), step_.dt, state, work);
-    dissipated_.add(work, share(a, b));
+    dissipated_.add(work, block.field[kWeight][lane] < 0 ? -share(a, b) : share(a, b));
   }
   state = ContactState{};
   block.set(lane, kStateField, kContactStateSize, &state);
@@ -529,7 +538,7 @@ void ContactStages::apply_law(ContactBlock& block, int first, const Results& res
     law.ct[l] = c.ct;
     law.mu[l] = c.mu;
   }
-  const Wide weight = lanes(block, kWeight, first);
+  const Wide index = lanes(block, kWeight, first), weight = magnitude(index);
   law.kn *= weight;
   law.kt *= weight;
   law.cn *= weight;
@@ -547,7 +556,8 @@ void ContactStages::apply_law(ContactBlock& block, int first, const Results& res
   ContactWorkOf<Wide> work{};
   advance_linear<Wide, ledger>(law, g, a, b, step_.dt, &state, &work);
 
-  const Triple<Wide> force = state.normal_force * state.normal + state.tangential_force;
+  const Wide sign = select(index < 0.0, all<Wide>(-1), all<Wide>(1)), pressed = sign * state.normal_force;
+  const Triple<Wide> force = pressed * state.normal + sign * state.tangential_force;
   const Triple<Wide> torque_a = cross(force, g.arm_a), torque_b = cross(g.arm_b, force);
   const Wide sum = force.x + force.y + force.z + torque_a.x + torque_a.y + torque_a.z + torque_b.x +
                    torque_b.y + torque_b.z + state.rate + work.damping + work.friction;
@@ -557,10 +567,9 @@ void ContactStages::apply_law(ContactBlock& block, int first, const Results& res
     std::memcpy(&block.field[kStateField + k][first], &keep, sizeof keep);
   }
   double load_a[kWidth][8], load_b[kWidth][8];
-  scatter({force.x, force.y, force.z, torque_b.x, torque_b.y, torque_b.z, state.normal_force, all<Wide>(1)},
-          load_b);
-  scatter({zero - force.x, zero - force.y, zero - force.z, torque_a.x, torque_a.y, torque_a.z,
-           state.normal_force, all<Wide>(1)},
+  scatter({force.x, force.y, force.z, torque_b.x, torque_b.y, torque_b.z, pressed, all<Wide>(1)}, load_b);
+  scatter({zero - force.x, zero - force.y, zero - force.z, torque_a.x, torque_a.y, torque_a.z, pressed,
+           all<Wide>(1)},
           load_a);
   for (int l = 0; l < kWidth; ++l) {
     if (results.touching[first + l] == 0) continue;
@@ -572,18 +581,31 @@ void ContactStages::apply_law(ContactBlock& block, int first, const Results& res
     add_load(body_a, load_a[l]);
     add_load(body_b, load_b[l]);
     if (ledger) {
-      const double weight = share(body_a, body_b);
+      const double weight = sign[l] * share(body_a, body_b);
       dissipated_.damping += weight * work.damping[l];
       dissipated_.friction += weight * work.friction[l];
     }
   }
 }
 
+namespace {
+
+// The load with its torque about the lab's origin instead of x.
+const double* shifted(const double* load_of, const double* x, double* to) {
+  std::memcpy(to, load_of, 8 * sizeof(double));
+  store(Vec3(load(load_of + 3) + load(x).cross(load(load_of))), to + 3);
+  return to;
+}
+
+}  // namespace
+
 // Sums that keep what each addition loses (Neumaier's variant of Kahan's, by Knuth's two-sum): the same bits
 // in whatever order the contacts come, but for the rounding of the rounding errors.
 void ContactStages::add_load(int body, const double* load) {
   if (body >= step_.owned) return;
   Accumulator& to = body < 0 ? wall_sum_ : sums_[body];
+  double about_origin[8];
+  if (body < -1) load = shifted(load, record(body).x, about_origin);
   if (body >= 0 && to.high[7] == 0) loaded_.push_back(body);
   Lane8 x, high, low;
   std::memcpy(&x, load, sizeof x);
@@ -610,6 +632,12 @@ ContactView ContactStages::view(const ContactBlock& block, int lane) const {
   block.get(lane, kStateField, kContactStateSize, &v.state);
   if (step_.model == nullptr) {
     v.stored = stored_energy(v.law, v.state);
+    if (block.field[kWeight][lane] < 0) {
+      v.stored.normal_spring = -v.stored.normal_spring;
+      v.stored.tangential_spring = -v.stored.tangential_spring;
+      v.state.normal_force = -v.state.normal_force;
+      for (double& f : v.state.tangential_force) f = -f;
+    }
     return v;
   }
   const auto& memory = *reinterpret_cast<const ModelMemory*>(pool_.memory(block, lane));

@@ -10,6 +10,7 @@
 #pragma once
 
 #include <array>
+#include <deque>
 #include <string>
 #include <vector>
 
@@ -52,7 +53,16 @@ struct ContactView {
   ContactCoefficients law;  // with the contact's share of the stiffness; zeros where a model serves
   ContactState state;
   Vec3 torque;          // of a model beside that of the force, on B
-  EnergyLedger stored;  // in its springs
+  EnergyLedger stored;  // in its springs; negative, as the forces are, where it takes others off
+};
+
+// A contact of a body with a wall of many faces, found by the caller (contact/surface_search.h).
+struct WallContact {
+  ContactResult result;  // points in lab axes from the lab's origin; A is the wall
+  double weight = 1;     // +1, or below 0: what other contacts count twice
+  Vec3 velocity = Vec3::Zero(), spin = Vec3::Zero();  // of the wall at point_a; lab
+  int mark = 0;                                       // the caller's
+  PairMemory memory;
 };
 
 // Whether a result is a contact.
@@ -103,6 +113,26 @@ class ContactStages {
 
   void compute(const Step& step);
 
+  // Contacts that the caller finds itself every step, instead of neighbours. They are listed by body: a head,
+  // the number of its first contact (0: none), travels with the body. A step is begin_step, give for every
+  // body that touches or has a list, end_step. At most kMostListed a body.
+  static constexpr int kMostListed = 32;
+  void begin_step(const Step& step);
+  // What came of the last step's contacts is carried over to those of this one by place and normal, whatever
+  // part of the wall they were on; those without a successor are closed.
+  void give(int body, std::int32_t* head, const WallContact* found, int count);
+  void end_step(double neighbours);
+  // The memory of a body's contacts and their normals, where the next search goes on; how many.
+  int former(std::int32_t head, Vec3* normals, PairMemory* memories) const;
+  // After bodies were renumbered or have left: begin, a call per body with a list, end. Others are dropped.
+  void begin_lists();
+  void keep_list(int body, std::int32_t head);
+  void end_lists();
+  int list_size(std::int32_t head) const;  // doubles
+  int pack_list(std::int32_t head, double* to) const;
+  std::int32_t unpack_list(const double* from, int* size);
+  int mark(int a) const { return partners_[-2 - a].mark; }  // of a contact with such a body a
+
   // Sums over the contacts of the last compute: of an owned body, and of the wall (torque about its x).
   // Bodies that are not among `loaded` have none.
   const std::vector<int>& loaded() const { return loaded_; }
@@ -137,7 +167,9 @@ class ContactStages {
   static Sum total(const Accumulator& s);
   double share(int a, int b) const { return a < step_.owned && b < step_.owned ? 1 : 0.5; }
   ContactView view(const ContactBlock& block, int lane) const;
-  const BodyRecord& record(int body) const { return body < 0 ? *step_.wall : step_.bodies->record(body); }
+  const BodyRecord& record(int body) const {
+    return body >= 0 ? step_.bodies->record(body) : body == -1 ? *step_.wall : partners_[-2 - body].record;
+  }
   double path(int k) const;
   std::uint64_t stamp_of(int a, int b) const;
   int law_of(int a, int b) const;
@@ -181,6 +213,23 @@ class ContactStages {
                    double overlap, ContactState* single);
   void load_model(const ContactBlock& block, int lane, const ContactState& state);
 
+  // The wall's side of a listed contact, which is body -1 - number; wall_stage.cpp.
+  struct Partner {
+    BodyRecord record{};  // x: a fixed point near the contact
+    PairProof proof{};
+    std::int32_t next = 0;  // contact of the same body
+    int mark = 0;
+    bool seen = false;
+  };
+  Partner& partner(std::int32_t number) { return partners_[number - 1]; }
+  const Partner& partner(std::int32_t number) const { return partners_[number - 1]; }
+  std::int32_t add_listed(const ContactRecord& record);
+  std::int32_t adopt_listed(std::int32_t number);
+  void drop_listed(std::int32_t number);
+  void inherit(std::int32_t number, std::int32_t parent, const WallContact& found);
+  void count_listed(const WallContact& found, std::int32_t number, int body);
+  void update_listed(std::int32_t number, int body, const WallContact& found);
+
   // Flat faces, creases and ruled lines: flat_stage.cpp.
   bool may_be_flat(int a, int b) const;
   bool find_polygon(int a, int b, const Vec3& normal, double overlap, double reach, const ContactPolygon* old,
@@ -211,7 +260,8 @@ class ContactStages {
   bool renewed_ = false;
 
   ContactPool pool_;
-  std::vector<ContactResult> fresh_;  // results of contacts that stage (b) found
+  std::deque<Partner> partners_;      // by contact number, from 1
+  std::vector<ContactResult> fresh_;  // results of contacts that stage (b) found, or the caller
   LineVector<Accumulator> sums_;      // zero but for the loaded
   std::vector<int> loaded_;
   Accumulator wall_sum_{};

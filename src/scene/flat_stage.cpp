@@ -40,6 +40,8 @@ void fill(const ContactPolygon& polygon, const PolygonState& state, const Vec3& 
   }
 }
 
+}  // namespace
+
 // The state of a contact that takes over from others: their spring, and no dissipation to be finished.
 void take_over(const ContactCoefficients& law, const ContactGeometry& g, const BodyMotion& a,
                const BodyMotion& b, double dt, const Vec3& spring, ContactState* state) {
@@ -54,6 +56,8 @@ void take_over(const ContactCoefficients& law, const ContactGeometry& g, const B
   for (int k = 0; k < 3; ++k) state->tangential_force[k] = -law.kt * state->spring[k];
 }
 
+namespace {
+
 bool rests(const ContactState& state) {
   return state.active == 0 || std::abs(state.rate) * state.dt < kResting * state.overlap;
 }
@@ -61,7 +65,8 @@ bool rests(const ContactState& state) {
 }  // namespace
 
 bool ContactStages::may_be_flat(int a, int b) const {
-  return record(b).flat != 0 && (a < 0 || record(a).flat != 0) && step_.settings.solver == Solver::ladder;
+  return record(b).flat != 0 && a >= -1 && (a < 0 || record(a).flat != 0) &&
+         step_.settings.solver == Solver::ladder;
 }
 
 // Energy that left the springs.
@@ -318,7 +323,7 @@ void ContactStages::settle_left(ContactBlock& block, int lane, const Results& re
 // A contact that was left with more or less than its stiffness gets back to it, as a polygon does.
 void ContactStages::relax_weight(ContactBlock& block, int lane, double gap) {
   double& weight = block.field[kWeight][lane];
-  if (weight == 1) return;
+  if (weight == 1 || weight < 0) return;
   if (block.field[kStateField][lane] == 0) {
     weight = 1;
     return;

@@ -1,0 +1,20 @@
+// All contacts of a convex body with an infinite cylinder, from outside or inside.
+//
+// Directions d square to the axis are enough. Outside, the two are convex: one contact, the line contact of
+// the axis with the cylinder's radius. Inside, the body's distance from the axis,
+//     F(d) = max over b in B of d . (b - axis),
+// has a maximum for every place where the body leans on the wall: contacts are all the local maxima of F
+// above the radius. An oblong body across a tube has two.
+#pragma once
+
+#include "contact/surface_search.h"
+
+namespace nurbs {
+
+// The body is inside when its centre of mass is. Normals point to the body. `path`: see surface_search.h. One
+// search of 4 to 6 supports; some tens inside a tube whose radius is less than one of the body's radii of
+// curvature, or where it has flats: maxima closer than 2e-3 rad are then found as one.
+void find_cylinder_contacts(const Particle& particle, const Vec3& origin, const Vec3& axis, double radius,
+                            double path, SurfaceContacts* out);
+
+}  // namespace nurbs

@@ -1,0 +1,195 @@
+// See surface_wall.h.
+#include "scene/surface_wall.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+
+#include "contact/cylinder_search.h"
+
+namespace nurbs {
+namespace {
+
+constexpr double kWeld = 1e-6;  // of the bounding radius: corners of a mesh this close are one
+
+Triangle triangle_at(const double* nodes, int number) {
+  Triangle t;
+  for (int k = 0; k < 3; ++k) t[k] = Vec3::Map(nodes + 9 * number + 3 * k);
+  return t;
+}
+
+// Angular velocity that three moving points have, by least squares of w x e = change of velocity along e.
+Vec3 spin_of(const Triangle& x, const Triangle& v) {
+  Mat3 sum = Mat3::Zero();
+  Vec3 right = Vec3::Zero();
+  for (int k = 0; k < 3; ++k) {
+    const Vec3 e = x[(k + 1) % 3] - x[k], a = v[(k + 1) % 3] - v[k];
+    sum += e.squaredNorm() * Mat3::Identity() - e * e.transpose();
+    right += e.cross(a);
+  }
+  if (right.squaredNorm() == 0) return Vec3::Zero();
+  return sum.inverse() * right;
+}
+
+// Velocity at a point of the triangle's plane, linear between the corners.
+Vec3 velocity_at(const Triangle& x, const Triangle& v, const Vec3& at) {
+  const Vec3 n = (x[1] - x[0]).cross(x[2] - x[0]);
+  const double n2 = n.squaredNorm();
+  if (!(n2 > 0)) return v[0];
+  const double b = n.dot((at - x[0]).cross(x[2] - x[0])) / n2, c = n.dot((x[1] - x[0]).cross(at - x[0])) / n2;
+  return v[0] + b * (v[1] - v[0]) + c * (v[2] - v[0]);
+}
+
+}  // namespace
+
+void SurfaceWall::place(const Vec3& origin, const Vec3& axis, double radius, const WallMotion& motion) {
+  origin_ = origin;
+  axis_ = axis;
+  radius_ = radius;
+  motion_ = motion;
+}
+
+void SurfaceWall::begin_near(int bodies) {
+  near_.clear();
+  first_.assign(bodies + 1, 0);
+  expiry_.assign(bodies, -kFarAway);
+  patch_of_.assign(bodies, -1);
+  patches_used_ = 0;
+  path_ = 0;
+}
+
+// In an order that does not depend on who owns what.
+void SurfaceWall::end_near(const std::vector<TriangleArray>& meshes) {
+  if (kind_ == Kind::mesh)
+    std::sort(near_.begin(), near_.end(), [&](const Near& a, const Near& b) {
+      if (a.body != b.body) return a.body < b.body;
+      if (a.mesh != b.mesh) return a.mesh < b.mesh;
+      const TriangleArray& mesh = meshes[a.mesh];
+      if (mesh.id[a.triangle] != mesh.id[b.triangle]) return mesh.id[a.triangle] < mesh.id[b.triangle];
+      const double *x = mesh.nodes + 9 * a.triangle, *y = mesh.nodes + 9 * b.triangle;
+      return std::lexicographical_compare(x, x + 3, y, y + 3);
+    });
+  bodies_near_ = 0;
+  std::size_t k = 0;
+  for (std::size_t body = 0; body + 1 < first_.size(); ++body) {
+    first_[body] = static_cast<int>(k);
+    while (k < near_.size() && near_[k].body == static_cast<int>(body)) ++k;
+    bodies_near_ += static_cast<int>(k) > first_[body];
+  }
+  first_.back() = static_cast<int>(k);
+}
+
+void SurfaceWall::find(const ContactStages::Step& step, const std::vector<TriangleArray>& meshes,
+                       double moved, std::int32_t* const* heads, ContactStages* stages) {
+  path_ += moved;
+  overflows_ = 0;
+  if (step.bodies->reshaped()) {
+    std::fill(expiry_.begin(), expiry_.end(), -kFarAway);
+    std::fill(patch_of_.begin(), patch_of_.end(), -1);
+    patches_used_ = 0;
+  }
+  const double* path = step.bodies->path();
+  for (int body = 0; body + 1 < static_cast<int>(first_.size()); ++body) {
+    const bool near = first_[body] < first_[body + 1];
+    std::int32_t* head = heads[body];
+    if (*head == 0 && (!near || path[body] + path_ < expiry_[body])) continue;
+    if (near)
+      find_for(body, step, meshes, head, stages);
+    else
+      stages->give(body, head, nullptr, 0);
+  }
+}
+
+void SurfaceWall::find_for(int body, const ContactStages::Step& step,
+                           const std::vector<TriangleArray>& meshes, std::int32_t* head,
+                           ContactStages* stages) {
+  FormerContact former[ContactStages::kMostListed];
+  const int formers = stages->former(*head, former_normals_, former_memories_);
+  for (int k = 0; k < formers; ++k) former[k] = {former_normals_[k], former_memories_ + k};
+  const Particle particle = step.bodies->particle(body);
+  if (!finite(particle)) return stages->give(body, head, nullptr, 0);
+  if (kind_ == Kind::cylinder)
+    find_cylinder_contacts(particle, origin_, axis_, radius_, step.bodies->path()[body] + path_, &contacts_);
+  else
+    find_in_mesh(body, step, meshes, former, formers);
+  expiry_[body] = contacts_.expiry;
+  overflows_ += contacts_.full;
+  for (int k = 0; k < contacts_.count; ++k) {
+    const SurfaceContact& c = contacts_.contact[k];
+    WallContact& f = found_[k];
+    f.weight = c.weight;
+    f.memory = c.memory;
+    ContactResult& r = f.result;
+    r = ContactResult{};
+    r.status = c.converged ? Status::converged : Status::unresolved;
+    r.rung = c.rung;
+    r.iterations = c.iterations;
+    r.gap = r.lower = r.upper = c.gap;
+    r.normal = c.normal;
+    r.point_b = particle.x + c.on_body;
+    r.point_a = r.point_b - c.gap * c.normal;
+    motion_at(c, r.point_a, body, meshes, &f);
+  }
+  stages->give(body, head, found_, contacts_.count);
+}
+
+void SurfaceWall::gather(int body, const std::vector<TriangleArray>& meshes) {
+  triangles_.clear();
+  for (int k = first_[body]; k < first_[body + 1]; ++k)
+    triangles_.push_back(triangle_at(meshes[near_[k].mesh].nodes, near_[k].triangle));
+}
+
+void SurfaceWall::find_in_mesh(int body, const ContactStages::Step& step,
+                               const std::vector<TriangleArray>& meshes, const FormerContact* former,
+                               int count) {
+  const Particle particle = step.bodies->particle(body);
+  bool made = false;
+  if (patch_of_[body] < 0) {
+    made = true;
+    if (patches_used_ == static_cast<int>(patches_.size())) patches_.push_back(std::make_unique<MeshPatch>());
+    patch_of_[body] = patches_used_++;
+  }
+  MeshPatch& patch = *patches_[patch_of_[body]];
+  if (kind_ == Kind::plane) {
+    if (made)
+      patch.build_plane(origin_, axis_);
+    else
+      patch.move_plane(origin_, axis_);
+  } else if (made || path_ > 0) {
+    gather(body, meshes);
+    if (made)
+      patch.build(triangles_.data(), static_cast<int>(triangles_.size()),
+                  kWeld * step.bodies->record(body).radius);
+    else
+      patch.move(triangles_.data());
+  }
+  find_surface_contacts(particle, patch, step.settings, step.bodies->path()[body] + path_, former, count,
+                        &contacts_);
+}
+
+void SurfaceWall::motion_at(const SurfaceContact& c, const Vec3& point, int body,
+                            const std::vector<TriangleArray>& meshes, WallContact* out) const {
+  out->mark = 0;
+  if (kind_ != Kind::mesh) {
+    out->spin = motion_.spin;
+    out->velocity = motion_.velocity + motion_.spin.cross(point - motion_.centre);
+    return;
+  }
+  const Near& near = near_[first_[body] + c.triangle];
+  const TriangleArray& mesh = meshes[near.mesh];
+  out->mark = near.triangle * kMostMeshes + near.mesh;
+  out->spin = out->velocity = Vec3::Zero();
+  if (!mesh.velocity) return;
+  const Triangle x = triangle_at(mesh.nodes, near.triangle), v = triangle_at(mesh.velocity, near.triangle);
+  out->velocity = velocity_at(x, v, point);
+  out->spin = spin_of(x, v);
+}
+
+std::size_t SurfaceWall::bytes() const {
+  std::size_t sum = near_.capacity() * sizeof(Near) + first_.capacity() * sizeof(int) +
+                    expiry_.capacity() * (sizeof(double) + sizeof(int));
+  for (const auto& patch : patches_) sum += patch->bytes();
+  return sum;
+}
+
+}  // namespace nurbs

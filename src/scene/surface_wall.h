@@ -1,0 +1,86 @@
+// A wall that bodies meet in several places: triangle meshes, a cylinder, a plane that moves. Finds its
+// contacts with every body near it, once a step, and hands them to the stages, which keep their history.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <vector>
+
+#include "contact/surface_search.h"
+#include "scene/contact_stages.h"
+
+namespace nurbs {
+
+// Triangles as a host holds them: three nodes of three numbers each, contiguous.
+struct TriangleArray {
+  int count = 0;
+  const double* nodes = nullptr;
+  const double* velocity = nullptr;  // of the nodes, laid out alike; null where nothing moves
+  const int* id = nullptr;           // the same on all ranks, images of a triangle across a border alike
+};
+
+// How a wall moves as a rigid body: velocity of the point that is at `centre`, and spin.
+struct WallMotion {
+  Vec3 centre = Vec3::Zero(), velocity = Vec3::Zero(), spin = Vec3::Zero();
+};
+
+class SurfaceWall {
+ public:
+  enum class Kind { mesh, plane, cylinder };
+  explicit SurfaceWall(Kind kind = Kind::mesh) : kind_(kind) {}
+
+  // Pose of a plane (`axis` its normal) or of a cylinder (`axis` along it), and its motion.
+  void place(const Vec3& origin, const Vec3& axis, double radius, const WallMotion& motion);
+
+  // Who is near which triangle from now on; for a plane or cylinder mesh and triangle mean nothing, and every
+  // body that may touch is added once. begin; a call per pair; end. Bodies are numbered below `bodies`.
+  void begin_near(int bodies);
+  void add_near(int body, int mesh, int triangle) { near_.push_back({body, mesh, triangle}); }
+  void end_near(const std::vector<TriangleArray>& meshes);
+
+  // Contacts of this step: to be called between begin_step and end_step of the stages. heads[i]: list of body
+  // i. `moved`: a way that no point of the wall has exceeded since the last call.
+  void find(const ContactStages::Step& step, const std::vector<TriangleArray>& meshes, double moved,
+            std::int32_t* const* heads, ContactStages* stages);
+
+  double neighbours() const { return static_cast<double>(bodies_near_); }
+  // Bodies with more contacts than fit, in the last step.
+  int overflows() const { return overflows_; }
+  // Mesh and triangle of a contact, by its mark.
+  int mesh_of(int mark) const { return mark % kMostMeshes; }
+  int triangle_of(int mark) const { return mark / kMostMeshes; }
+  std::size_t bytes() const;
+
+  static constexpr int kMostMeshes = 16;
+
+ private:
+  struct Near {
+    int body, mesh, triangle;
+  };
+  void find_for(int body, const ContactStages::Step& step, const std::vector<TriangleArray>& meshes,
+                std::int32_t* head, ContactStages* stages);
+  void find_in_mesh(int body, const ContactStages::Step& step, const std::vector<TriangleArray>& meshes,
+                    const FormerContact* former, int count);
+  void gather(int body, const std::vector<TriangleArray>& meshes);
+  void motion_at(const SurfaceContact& c, const Vec3& point, int body,
+                 const std::vector<TriangleArray>& meshes, WallContact* out) const;
+
+  Kind kind_;
+  Vec3 origin_ = Vec3::Zero(), axis_ = Vec3::UnitZ();
+  double radius_ = 0;
+  WallMotion motion_;
+  std::vector<Near> near_;      // by body
+  std::vector<int> first_;      // of each body in near_
+  std::vector<double> expiry_;  // path up to which a body is clear of the wall
+  std::vector<int> patch_of_;   // body to patch, -1: not made
+  std::vector<std::unique_ptr<MeshPatch>> patches_;
+  int patches_used_ = 0, bodies_near_ = 0, overflows_ = 0;
+  double path_ = 0;  // of the wall since the last end_near
+  std::vector<Triangle> triangles_;
+  SurfaceContacts contacts_;
+  WallContact found_[kSurfaceContacts];
+  Vec3 former_normals_[ContactStages::kMostListed];
+  PairMemory former_memories_[ContactStages::kMostListed];
+};
+
+}  // namespace nurbs

@@ -1,0 +1,269 @@
+// Contacts with walls of many faces: the caller finds them anew every step (contact/surface_search.h); here
+// they get their history and go through the law with all others.
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+
+#include "scene/contact_results.h"
+
+namespace nurbs {
+namespace {
+
+constexpr double kSameSide = 0.7;            // cosine between normals: 45 degrees
+constexpr int kListedSize = 4 + kProofSize;  // doubles of a listed contact beside its record: x, mark, proof
+
+}  // namespace
+
+std::int32_t ContactStages::add_listed(const ContactRecord& record) {
+  return adopt_listed(pool_.add(record));
+}
+
+// Gives a contact of the pool its partner.
+std::int32_t ContactStages::adopt_listed(std::int32_t number) {
+  while (partners_.size() < static_cast<std::size_t>(number)) partners_.emplace_back();
+  Partner& p = partner(number);
+  p = Partner{};
+  for (int k = 0; k < 9; k += 4) p.record.turn[k] = 1;
+  p.record.radius = kFarAway;
+  ContactBlock& block = pool_.block(number);
+  const int lane = ContactPool::lane(number);
+  block.proof[lane] = &p.proof;
+  block.neighbour[lane] = -1;
+  block.a[lane] = -1 - number;
+  block.law[lane] = 0;
+  block.fresh[lane] = 0;
+  return number;
+}
+
+void ContactStages::drop_listed(std::int32_t number) {
+  pool_.remove(number);
+  partner(number).next = 0;
+}
+
+int ContactStages::former(std::int32_t head, Vec3* normals, PairMemory* memories) const {
+  int count = 0;
+  for (; head != 0 && count < kMostListed; head = partner(head).next) {
+    const ContactBlock& block = pool_.blocks()[(head - 1) / kBlock];
+    const int lane = ContactPool::lane(head);
+    double normal[3];
+    block.get(lane, kStateField + 3, 3, normal);
+    normals[count] = load(normal);
+    PairMemory& m = memories[count++];
+    m.proof = partner(head).proof;
+    block.get(lane, kLocalModelSize, 10, &m.on_a);
+    block.get(lane, 0, kLocalModelSize, &m.model);
+  }
+  return count;
+}
+
+// What the contact is in this step, but for its state of the law.
+void ContactStages::update_listed(std::int32_t number, int body, const WallContact& found) {
+  Partner& p = partner(number);
+  ContactBlock& block = pool_.block(number);
+  const int lane = ContactPool::lane(number);
+  const Vec3 x = load(p.record.x);
+  store(Vec3(found.velocity - found.spin.cross(found.result.point_a - x)), p.record.velocity);
+  store(found.spin, p.record.spin);
+  store(found.spin, p.record.spin_before);
+  p.mark = found.mark;
+  block.b[lane] = body;
+  block.law[lane] = law_of(-1, body);
+  if (found.weight < 0) block.field[kWeight][lane] = found.weight;
+  ContactResult r = found.result;
+  r.point_a -= x;
+  r.point_b -= x;
+  fresh_.push_back(r);
+  block.fresh[lane] = static_cast<int>(fresh_.size());
+}
+
+void ContactStages::give(int body, std::int32_t* head, const WallContact* found, int count) {
+  struct Old {
+    std::int32_t number;
+    Vec3 normal, point;
+    double weight;
+    bool taken;
+  };
+  Old old[kMostListed];
+  int olds = 0;
+  bool reentrant = false;  // some surface is counted twice and taken off: no contact is on its own
+  const BodyRecord& b = step_.bodies->record(body);
+  for (std::int32_t n = *head; n != 0 && olds < kMostListed; n = partner(n).next) {
+    ContactBlock& block = pool_.block(n);
+    const int lane = ContactPool::lane(n);
+    block.b[lane] = body;
+    ContactState state;
+    block.get(lane, kStateField, kContactStateSize, &state);
+    BodyRecord& wall = partner(n).record;
+    if (state.active != 0) {  // a body that comes back through a periodic border takes its walls along
+      const Vec3 moved = load(b.x) - (load(wall.x) + load(state.arm_a) - load(state.arm_b));
+      if (moved.squaredNorm() > b.radius * b.radius) store(Vec3(load(wall.x) + moved), wall.x);
+    }
+    old[olds++] = {n, load(state.normal), load(wall.x) + load(state.arm_a), block.field[kWeight][lane],
+                   false};
+    reentrant = reentrant || block.field[kWeight][lane] < 0;
+  }
+  count = std::min(count, kMostListed);
+  for (int k = 0; k < count; ++k) reentrant = reentrant || found[k].weight < 0;
+
+  // Nearest first.
+  std::int32_t number[kMostListed] = {};
+  const auto distance2 = [&](const Old& o, const WallContact& f) {
+    return (o.point - 0.5 * (f.result.point_a + f.result.point_b)).squaredNorm();
+  };
+  for (int pairs = std::min(olds, count); pairs-- > 0;) {
+    int best_old = -1, best_found = -1;
+    double least = kFarAway;
+    for (int i = 0; i < olds; ++i)
+      for (int k = 0; k < count && !old[i].taken; ++k) {
+        if (number[k] != 0 || (old[i].weight < 0) != (found[k].weight < 0)) continue;
+        if (old[i].normal.dot(found[k].result.normal) < kSameSide) continue;
+        const double d = distance2(old[i], found[k]);
+        if (d < least) least = d, best_old = i, best_found = k;
+      }
+    if (best_old < 0) break;
+    old[best_old].taken = true;
+    number[best_found] = old[best_old].number;
+  }
+
+  std::int32_t first = 0, *link = &first;
+  for (int k = 0; k < count; ++k) {
+    const WallContact& f = found[k];
+    const bool known = number[k] != 0;
+    if (!known) {
+      ContactRecord record{f.memory.model, f.memory.on_a, f.memory.on_b, {}, {0, 0, 0}, 1, 0};
+      number[k] = add_listed(record);
+      store(f.result.point_a, partner(number[k]).record.x);
+    }
+    const std::int32_t n = number[k];
+    ContactBlock& block = pool_.block(n);
+    const int lane = ContactPool::lane(n);
+    if (!known || !step_.setup) {
+      partner(n).proof = f.memory.proof;
+      block.set(lane, 0, kLocalModelSize, &f.memory.model);
+      block.set(lane, kLocalModelSize, 10, &f.memory.on_a);
+    }
+    partner(n).proof.contact = n;
+    update_listed(n, body, f);
+    count_listed(f, n, body);
+    if (!known && reentrant && !step_.setup) {
+      const Old* parent = nullptr;
+      double least = 0.25 * b.radius * b.radius;
+      for (int i = 0; i < olds; ++i) {
+        const double d = distance2(old[i], f);
+        if (old[i].normal.dot(f.result.normal) >= kSameSide && d < least) least = d, parent = old + i;
+      }
+      if (parent) inherit(n, parent->number, f);
+    }
+  }
+  for (int i = 0; i < olds; ++i) {
+    if (old[i].taken) continue;
+    close(pool_.block(old[i].number), ContactPool::lane(old[i].number));
+    drop_listed(old[i].number);
+  }
+  for (int k = 0; k < count; ++k) {
+    *link = number[k];
+    link = &partner(number[k]).next;
+  }
+  *link = 0;
+  *head = first;
+}
+
+// A contact that appears with its counterpart, or in place of one, has the spring of the one it comes from.
+void ContactStages::inherit(std::int32_t number, std::int32_t parent, const WallContact& found) {
+  ContactState old, state;
+  const ContactBlock& from = pool_.block(parent);
+  from.get(ContactPool::lane(parent), kStateField, kContactStateSize, &old);
+  if (old.active == 0) return;
+  ContactBlock& block = pool_.block(number);
+  const int lane = ContactPool::lane(number);
+  if (step_.model != nullptr) {
+    const double* memory = pool_.memory(from, ContactPool::lane(parent));
+    return take_over_model(memory, block, lane);
+  }
+  const int b = block.b[lane];
+  const Vec3 middle = 0.5 * (found.result.point_a + found.result.point_b);
+  const ContactCoefficients law = coefficients(block, lane);
+  take_over(law,
+            {-found.result.gap, found.result.normal, middle - load(partner(number).record.x),
+             middle - load(record(b).x)},
+            motion_of(partner(number).record), motion_of(record(b)), step_.dt, load(old.spring), &state);
+  block.set(lane, kStateField, kContactStateSize, &state);
+  if (step_.ledger && state.active != 0)
+    dissipated_.damping -= (block.field[kWeight][lane] < 0 ? -1 : 1) * share(-1, b) *
+                           stored_energy(law, state).tangential_spring;
+}
+
+// A contact that takes another off is none to be counted.
+void ContactStages::count_listed(const WallContact& found, std::int32_t number, int body) {
+  if (found.weight < 0)
+    counts_.value[ContactCounts::iterations] += found.result.iterations;
+  else
+    count(found.result, -1 - number, body);
+}
+
+// --- lists
+
+void ContactStages::begin_lists() {
+  for (Partner& p : partners_) p.seen = false;
+}
+
+void ContactStages::keep_list(int body, std::int32_t head) {
+  for (; head != 0; head = partner(head).next) {
+    partner(head).seen = true;
+    pool_.block(head).b[ContactPool::lane(head)] = body;
+  }
+}
+
+void ContactStages::end_lists() {
+  for (std::size_t k = 0; k < partners_.size(); ++k) {
+    const auto number = static_cast<std::int32_t>(k + 1);
+    if (!partners_[k].seen && pool_.holds(number)) drop_listed(number);
+  }
+}
+
+int ContactStages::list_size(std::int32_t head) const {
+  int size = 1;
+  for (; head != 0; head = partner(head).next) size += kListedSize + pool_.packed_size(head);
+  return size;
+}
+
+int ContactStages::pack_list(std::int32_t head, double* to) const {
+  int m = 1, count = 0;
+  for (; head != 0; head = partner(head).next, ++count) {
+    const Partner& p = partner(head);
+    std::memcpy(to + m, p.record.x, 3 * sizeof(double));
+    to[m + 3] = p.mark;
+    std::memcpy(to + m + 4, &p.proof, sizeof p.proof);
+    m += kListedSize;
+    m += pool_.pack(head, to + m);
+  }
+  to[0] = count;
+  return m;
+}
+
+std::int32_t ContactStages::unpack_list(const double* from, int* size) {
+  std::int32_t first = 0;
+  int m = 1;
+  std::int32_t last = 0;
+  for (int k = static_cast<int>(from[0]); k-- > 0;) {
+    int record_size = 0;
+    const double* values = from + m;
+    const std::int32_t loose = pool_.unpack(values + kListedSize, &record_size);
+    const std::int32_t number = adopt_listed(loose);
+    Partner& p = partner(number);
+    std::memcpy(p.record.x, values, 3 * sizeof(double));
+    p.mark = static_cast<int>(values[3]);
+    std::memcpy(&p.proof, values + 4, sizeof p.proof);
+    p.proof.contact = number;
+    if (last == 0)
+      first = number;
+    else
+      partner(last).next = number;
+    last = number;
+    m += kListedSize + record_size;
+  }
+  *size = m;
+  return first;
+}
+
+}  // namespace nurbs
