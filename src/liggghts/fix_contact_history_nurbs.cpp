@@ -7,6 +7,7 @@
 #include "atom.h"
 #include "comm.h"
 #include "force.h"
+#include "liggghts/fix_wall_nurbs.h"
 #include "liggghts/nurbs_contact.h"
 #include "liggghts/pair_gran_nurbs.h"
 #include "modify.h"
@@ -99,10 +100,8 @@ void FixContactHistoryNurbs::pre_exchange() {
   for_each_neighbour([](int& flag, const double*) { flag &= kTouching; });
   for (int i = 0; i < atom->nlocal; ++i) most = std::max(most, contacts_size(i));
   // The host takes the maximum over fixes of what one particle sends; walls send theirs beside this.
-  const int walls = modify->n_fixes_style("wall/nurbs");
-  comm->maxexchange_fix =
-      std::max(comm->maxexchange_fix,
-               (dnum_ + 1) * maxtouch_ + 1 + most + walls * (nurbs::kProofSize + nurbs::kMostContactSize));
+  for (FixWallNurbs* wall : FixWallNurbs::all(lmp)) most += wall->most_exchanged();
+  comm->maxexchange_fix = std::max(comm->maxexchange_fix, (dnum_ + 1) * maxtouch_ + 1 + most);
 }
 
 void FixContactHistoryNurbs::setup_pre_exchange() {

@@ -5,14 +5,18 @@
 #include <cmath>
 #include <cstdlib>
 #include <cstring>
+#include <limits>
 
 #include "atom.h"
 #include "comm.h"
 #include "domain.h"
+#include "fix_mesh_surface.h"
+#include "fix_neighlist_mesh.h"
 #include "force.h"
 #include "liggghts/host_error.h"
 #include "liggghts/pair_gran_nurbs.h"
 #include "memory.h"
+#include "mesh_module_stress.h"
 #include "modify.h"
 #include "neighbor.h"
 #include "update.h"
@@ -25,14 +29,30 @@ using Vec3Map = Eigen::Map<Vec3>;
 
 namespace {
 
-constexpr int kPlaneArguments = 7;  // plane PX PY PZ NX NY NZ
+constexpr int kPlaneArguments = 7;     // plane PX PY PZ NX NY NZ
+constexpr int kCylinderArguments = 5;  // cylinder x|y|z RADIUS C1 C2
+
+bool begins_law(const char* word) {
+  for (const char* first : {"kn", "kt", "cn", "ct", "mu", "type", "model", "radius", "move"})
+    if (std::strcmp(word, first) == 0) return true;
+  return false;
+}
 
 }  // namespace
 
 FixWallNurbs::FixWallNurbs(LAMMPS* lmp, int narg, char** arg) : Fix(lmp, narg, arg) {
   AtomVecNurbs::require(lmp, "Fix wall/nurbs");
-  parse_plane(narg, arg);
-  parse_law(3 + kPlaneArguments, narg, arg);
+  const std::string kind = narg < 4 ? "" : arg[3];
+  if (kind != "plane" && kind != "cylinder" && kind != "mesh")
+    fail_all(FLERR, lmp,
+             "Fix wall/nurbs: kind of wall " + (kind.empty() ? "is missing;" : kind) +
+                 " must be plane, cylinder or mesh");
+  const int first = kind == "plane"      ? parse_plane(narg, arg)
+                    : kind == "cylinder" ? parse_cylinder(narg, arg)
+                                         : parse_mesh(narg, arg);
+  narg = parse_motion(narg, arg);
+  parse_law(first, narg, arg);
+  surface_ = nurbs::SurfaceWall(kind_);
 
   scalar_flag = vector_flag = 1;
   size_vector = 6;
@@ -53,11 +73,7 @@ FixWallNurbs::~FixWallNurbs() {
   memory->destroy(proofs_);
 }
 
-void FixWallNurbs::parse_plane(int narg, char** arg) {
-  if (narg < 4 || std::strcmp(arg[3], "plane") != 0)
-    fail_all(FLERR, lmp,
-             std::string("Fix wall/nurbs: kind of wall ") + (narg < 4 ? "is missing;" : arg[3]) +
-                 " must be plane");
+int FixWallNurbs::parse_plane(int narg, char** arg) {
   if (narg < 3 + kPlaneArguments) fail_all(FLERR, lmp, "Fix wall/nurbs plane needs PX PY PZ NX NY NZ");
   Vec3 normal;
   for (int k = 0; k < 3; ++k) {
@@ -67,6 +83,60 @@ void FixWallNurbs::parse_plane(int narg, char** arg) {
   const double length = normal.stableNorm();
   if (!(length > 0)) fail_all(FLERR, lmp, "Fix wall/nurbs plane: normal = 0 0 0 must have a length > 0");
   normal_ = normal / length;
+  return 3 + kPlaneArguments;
+}
+
+int FixWallNurbs::parse_cylinder(int narg, char** arg) {
+  kind_ = Kind::cylinder;
+  if (narg < 3 + kCylinderArguments) fail_all(FLERR, lmp, "Fix wall/nurbs cylinder needs x|y|z RADIUS C1 C2");
+  const int axis = arg[4][0] - 'x';
+  if (std::strlen(arg[4]) != 1 || axis < 0 || axis > 2)
+    fail_all(FLERR, lmp, std::string("Fix wall/nurbs cylinder: axis ") + arg[4] + " must be x, y or z");
+  radius_ = nurbs_host::parse_positive(lmp, "Fix wall/nurbs cylinder: radius", arg[5]);
+  normal_ = Vec3::Unit(axis);
+  origin_ = Vec3::Zero();
+  origin_[axis == 0 ? 1 : 0] = nurbs_host::parse_number(lmp, "Fix wall/nurbs cylinder: C1", arg[6]);
+  origin_[axis == 2 ? 1 : 2] = nurbs_host::parse_number(lmp, "Fix wall/nurbs cylinder: C2", arg[7]);
+  return 3 + kCylinderArguments;
+}
+
+int FixWallNurbs::parse_mesh(int narg, char** arg) {
+  kind_ = Kind::mesh;
+  int k = 4;
+  for (; k < narg && !begins_law(arg[k]); ++k) {
+    const std::string name = arg[k];
+    Fix* fix = modify->find_fix_id(arg[k]);
+    if (fix == nullptr) fail_all(FLERR, lmp, "Fix wall/nurbs mesh: there is no fix " + name);
+    if (dynamic_cast<FixMeshSurface*>(fix) == nullptr)
+      fail_all(FLERR, lmp,
+               "Fix wall/nurbs mesh: fix " + name + " is a " + fix->style + "; it must be a mesh/surface");
+    for (const Mesh& mesh : meshes_)
+      if (mesh.id == name) fail_all(FLERR, lmp, "Fix wall/nurbs mesh: fix " + name + " is there twice");
+    meshes_.push_back({name, nullptr, nullptr, {}, {}});
+  }
+  if (meshes_.empty()) fail_all(FLERR, lmp, "Fix wall/nurbs mesh needs the ID of a fix mesh/surface");
+  if (meshes_.size() > nurbs::SurfaceWall::kMostMeshes)
+    fail_all(FLERR, lmp,
+             "Fix wall/nurbs mesh: " + std::to_string(meshes_.size()) + " meshes; at most " +
+                 std::to_string(nurbs::SurfaceWall::kMostMeshes) + " are possible in one wall");
+  return k;
+}
+
+// The words of `move` at the end; how many are left before them.
+int FixWallNurbs::parse_motion(int narg, char** arg) {
+  for (int k = 3; k < narg; ++k) {
+    if (std::strcmp(arg[k], "move") != 0) continue;
+    if (kind_ == Kind::mesh)
+      fail_all(FLERR, lmp,
+               "Fix wall/nurbs mesh: move is for planes and cylinders; meshes have fix move/mesh");
+    const int taken = motion_.parse(lmp, "Fix wall/nurbs", narg - k - 1, arg + k + 1);
+    if (k + 1 + taken < narg)
+      fail_all(
+          FLERR, lmp,
+          std::string("Fix wall/nurbs: ") + arg[k + 1 + taken] + " is too much after move, which comes last");
+    return k;
+  }
+  return narg;
 }
 
 void FixWallNurbs::parse_law(int first, int narg, char** arg) {
@@ -96,8 +166,26 @@ std::vector<FixWallNurbs*> FixWallNurbs::all(LAMMPS* lmp) {
   return walls;
 }
 
+// Lists of the particles near the meshes' triangles, made by the host.
+void FixWallNurbs::post_create() {
+  for (Mesh& mesh : meshes_) {
+    mesh.fix = dynamic_cast<FixMeshSurface*>(modify->find_fix_id(mesh.id.c_str()));
+    mesh.list = mesh.fix->createOtherNeighList(igroup, id);
+  }
+}
+
+void FixWallNurbs::pre_delete(bool unfixflag) {
+  if (!unfixflag) return;
+  for (Mesh& mesh : meshes_)
+    if (auto* fix = dynamic_cast<FixMeshSurface*>(modify->find_fix_id(mesh.id.c_str())))
+      fix->deleteOtherNeighList(id);
+}
+
 int FixWallNurbs::setmask() {
-  return FixConst::POST_FORCE | FixConst::THERMO_ENERGY;
+  int mask = FixConst::POST_FORCE | FixConst::THERMO_ENERGY | FixConst::PRE_EXCHANGE;
+  if (motion_.moves()) mask |= FixConst::INITIAL_INTEGRATE;
+  if (!meshes_.empty()) mask |= FixConst::PRE_FORCE;
+  return mask;
 }
 
 void FixWallNurbs::init() {
@@ -106,9 +194,15 @@ void FixWallNurbs::init() {
   freeze_groupbit_ = 0;
   for (int k = 0; k < modify->nfix; ++k)
     if (std::strcmp(modify->fix[k]->style, "freeze") == 0) freeze_groupbit_ = modify->fix[k]->groupbit;
-  const int walls = static_cast<int>(all(lmp).size());
-  comm->maxexchange_fix =
-      std::max(comm->maxexchange_fix, walls * (nurbs::kProofSize + nurbs::kMostContactSize));
+  for (Mesh& mesh : meshes_) {
+    mesh.fix = dynamic_cast<FixMeshSurface*>(modify->find_fix_id(mesh.id.c_str()));
+    if (mesh.fix == nullptr)
+      fail_all(FLERR, lmp,
+               std::string("Fix wall/nurbs ") + id + ": its fix mesh/surface " + mesh.id +
+                   " is gone; unfix the wall first");
+  }
+  if (!meshes_.empty() && neighbor->style != 1)
+    fail_all(FLERR, lmp, "Fix wall/nurbs mesh needs neighbor SKIN bin");
   ledger_ = nurbs_host::wants_ledger(lmp);
   if (models_) models_->init();
   warn_periodic();
@@ -116,6 +210,7 @@ void FixWallNurbs::init() {
 }
 
 void FixWallNurbs::warn_periodic() {
+  if (kind_ != Kind::plane) return;
   std::string directions;
   for (int k = 0; k < 3; ++k) {
     const Vec3 edge = nurbs_host::box_edge(*domain, k);
@@ -159,17 +254,160 @@ void FixWallNurbs::hand_in_neighbours() {
   stages_.end_neighbours();
 }
 
+void FixWallNurbs::initial_integrate(int) {
+  time_ += update->dt;
+}
+
+int FixWallNurbs::contacts_size(int i) const {
+  const std::int32_t contact = proof(i).contact;
+  if (listed()) return stages_.list_size(contact);
+  return nurbs::kProofSize + (stages_.pool().holds(contact) ? stages_.pool().packed_size(contact) : 0);
+}
+
+int FixWallNurbs::most_exchanged() {
+  int most = nurbs::kProofSize;
+  for (int i = 0; i < atom->nlocal; ++i) most = std::max(most, contacts_size(i));
+  return most;
+}
+
+// The host takes the largest of what its fixes ask for, but a particle sends all of theirs.
+void FixWallNurbs::pre_exchange() {
+  int most = 0;
+  for (FixWallNurbs* wall : all(lmp)) most += wall->most_exchanged();
+  comm->maxexchange_fix = std::max(comm->maxexchange_fix, most);
+}
+
+int FixWallNurbs::maxsize_restart() {
+  int mine = most_exchanged(), most = 0;
+  MPI_Allreduce(&mine, &most, 1, MPI_INT, MPI_MAX, world);
+  return 1 + most;
+}
+
+// --- walls whose contacts are lists by particle
+
+// The total force on a mesh starts anew at every step, but the host forgets to do so before a run.
+void FixWallNurbs::setup_pre_force(int) {
+  for (Mesh& mesh : meshes_)
+    if (auto* stress = dynamic_cast<MeshModuleStress*>(mesh.fix->get_module("stress"))) stress->pre_force(0);
+}
+
+// Brings the copies of the meshes' nodes up to date; returns a way that no node has exceeded since the last
+// call, or 0 where the triangles are others than then.
+double FixWallNurbs::read_meshes(bool others) {
+  double moved2 = 0;
+  triangles_.resize(meshes_.size());
+  for (std::size_t m = 0; m < meshes_.size(); ++m) {
+    TriMesh* mesh = meshes_[m].fix->triMesh();
+    nurbs::TriangleArray& t = triangles_[m];
+    t.count = mesh->sizeLocal() + mesh->sizeGhost();
+    std::vector<double>& nodes = meshes_[m].nodes;
+    const bool same = !others && nodes.size() == 9 * static_cast<std::size_t>(t.count);
+    if (!same || mesh->isMoving() || mesh->isDeforming()) {
+      nodes.resize(9 * static_cast<std::size_t>(t.count));
+      for (int k = 0; k < 3 * t.count; ++k) {
+        double x[3];
+        mesh->node(k / 3, k % 3, x);
+        Vec3Map at(nodes.data() + 3 * k);
+        if (same) moved2 = std::max(moved2, (Vec3Map(x) - at).squaredNorm());
+        at = Vec3Map(x);
+      }
+    }
+    t.nodes = nodes.data();
+    auto* velocity = mesh->prop().getElementProperty<MultiVectorContainer<double, 3, 3> >("v");
+    t.velocity = velocity != nullptr && t.count > 0 ? &velocity->begin()[0][0][0] : nullptr;
+    t.id = meshes_[m].ids.data();
+  }
+  return std::sqrt(moved2);
+}
+
+// Triangles without area have no plane; the first one, by number, ends the run.
+void FixWallNurbs::check_meshes() {
+  meshes_checked_ = true;
+  for (std::size_t m = 0; m < meshes_.size(); ++m) {
+    int mine = std::numeric_limits<int>::max(), first = 0;
+    for (int t = 0; t < triangles_[m].count; ++t) {
+      const double* x = triangles_[m].nodes + 9 * t;
+      const Vec3 a = Vec3::Map(x), b = Vec3::Map(x + 3), c = Vec3::Map(x + 6);
+      const double longest2 = std::max({(b - a).squaredNorm(), (c - b).squaredNorm(), (a - c).squaredNorm()});
+      if (!((b - a).cross(c - a).norm() > 1e-12 * longest2)) mine = std::min(mine, meshes_[m].ids[t]);
+    }
+    MPI_Allreduce(&mine, &first, 1, MPI_INT, MPI_MIN, world);
+    if (first != std::numeric_limits<int>::max())
+      fail_all(FLERR, lmp,
+               std::string("Fix wall/nurbs ") + id + ": triangle " + std::to_string(first + 1) + " of mesh " +
+                   meshes_[m].id + " has no area");
+  }
+}
+
+// The contacts' lists follow the particles; near are those that the host's lists have, or all.
+void FixWallNurbs::hand_in_surface() {
+  const int nlocal = atom->nlocal;
+  stages_.begin_lists();
+  for (int i = 0; i < nlocal; ++i) {
+    if (atom->mask[i] & groupbit)
+      stages_.keep_list(i, proof(i).contact);
+    else
+      proof(i).contact = 0;
+  }
+  stages_.end_lists();
+  surface_.begin_near(nlocal);
+  if (kind_ != Kind::mesh)
+    for (int i = 0; i < nlocal; ++i)
+      if (atom->mask[i] & groupbit) surface_.add_near(i, 0, 0);
+  for (std::size_t m = 0; m < meshes_.size(); ++m) {
+    Mesh& mesh = meshes_[m];
+    TriMesh* tri_mesh = mesh.fix->triMesh();
+    mesh.ids.resize(triangles_[m].count);
+    for (int t = 0; t < triangles_[m].count; ++t) {
+      mesh.ids[t] = tri_mesh->id(t);
+      for (const int i : mesh.list->get_contact_list(t))
+        if (i < nlocal && (atom->mask[i] & groupbit)) surface_.add_near(i, static_cast<int>(m), t);
+    }
+    triangles_[m].id = mesh.ids.data();
+  }
+  if (!meshes_checked_) check_meshes();
+  surface_.end_near(triangles_);
+}
+
+void FixWallNurbs::compute_surface(nurbs::ContactStages::Step& step) {
+  double moved = 0;
+  if (kind_ == Kind::mesh) {
+    moved = read_meshes(neighbor->ago == 0);
+  } else {
+    const double half = 0.5 * (domain->boxhi[0] - domain->boxlo[0] + domain->boxhi[1] - domain->boxlo[1] +
+                               domain->boxhi[2] - domain->boxlo[2]);
+    const Vec3 middle = 0.5 * (Vec3Map(domain->boxlo) + Vec3Map(domain->boxhi));
+    moved = motion_.way(middle, half, last_time_, time_);
+    last_time_ = time_;
+    // The law's velocities are those half a step ago.
+    surface_.place(motion_.point(origin_, time_), motion_.direction(normal_, time_), radius_,
+                   motion_.velocity(step.setup ? time_ : time_ - 0.5 * step.dt));
+  }
+  if (neighbor->ago == 0) hand_in_surface();
+  stages_.begin_step(step);
+  surface_.find(step, triangles_, moved, reinterpret_cast<nurbs::PairProof*>(proofs_[0]), &stages_);
+  stages_.end_step(surface_.neighbours());
+  if (kind_ == Kind::mesh) tell_meshes();
+}
+
+// What the meshes count: forces, wear.
+void FixWallNurbs::tell_meshes() {
+  stages_.for_each_contact([&](const nurbs::ContactView& contact) {
+    const int mark = stages_.mark(contact.a);
+    double force[3], arm[3], velocity[3];
+    Vec3Map{force} = force_on_b(contact.state);
+    Vec3Map{arm} = Eigen::Map<const Vec3>(contact.state.arm_b);
+    Vec3Map{velocity} = stages_.wall_velocity(contact);
+    meshes_[surface_.mesh_of(mark)].fix->add_particle_contribution(contact.b, force, arm,
+                                                                   surface_.triangle_of(mark), velocity);
+  });
+}
+
 // The wall is A: a plane of infinite mass whose normal no particle changes.
 void FixWallNurbs::post_force(int) {
   const PairGranNurbs* pair = PairGranNurbs::find(lmp);
   nurbs::ContactStages::Step step;
   step.bodies = pair != nullptr ? &bodies_->bodies() : &bodies_->update_bodies(freeze_groupbit_);
-  if (neighbor->ago == 0) hand_in_neighbours();
-  Vec3Map{wall_.x} = origin_;
-  for (int k = 0; k < 9; k += 4) wall_.turn[k] = 1;
-  wall_.radius = nurbs::kFarAway;
-  step.wall = &wall_;
-  step.wall_normal = normal_;
   step.owned = atom->nlocal;
   step.dt = update->dt;
   step.setup = update->setupflag != 0;
@@ -177,7 +415,17 @@ void FixWallNurbs::post_force(int) {
   step.settings = settings_;
   step.laws = &law_;
   step.model = models_.get();
-  stages_.compute(step);
+  if (listed()) {
+    compute_surface(step);
+  } else {
+    if (neighbor->ago == 0) hand_in_neighbours();
+    Vec3Map{wall_.x} = origin_;
+    for (int k = 0; k < 9; k += 4) wall_.turn[k] = 1;
+    wall_.radius = nurbs::kFarAway;
+    step.wall = &wall_;
+    step.wall_normal = normal_;
+    stages_.compute(step);
+  }
   for (const int i : stages_.loaded()) {
     const nurbs::ContactStages::Sum sum = stages_.sum(i);
     Vec3Map(atom->f[i]) += sum.force;
@@ -192,7 +440,9 @@ double FixWallNurbs::compute_scalar() {
 }
 
 double FixWallNurbs::compute_vector(int n) {
-  const nurbs::ContactStages::Sum sum = stages_.wall_sum();
+  nurbs::ContactStages::Sum sum = stages_.wall_sum();
+  if (listed() && kind_ != Kind::mesh)  // their sums are about the lab's origin
+    sum.torque -= motion_.point(origin_, time_).cross(sum.force);
   double mine = n < 3 ? sum.force[n] : sum.torque[n - 3], all = 0;
   MPI_Allreduce(&mine, &all, 1, MPI_DOUBLE, MPI_SUM, world);
   return all;
@@ -224,6 +474,7 @@ void FixWallNurbs::set_arrays(int i) {
 // The proof, and behind it the contact if there is one; its number in another rank's or run's pool means only
 // that it follows.
 int FixWallNurbs::pack_exchange(int i, double* buffer) {
+  if (listed()) return stages_.pack_list(proof(i).contact, buffer);
   nurbs::PairProof& own = proof(i);
   const bool touching = stages_.pool().holds(own.contact);
   if (!touching) own.contact = 0;
@@ -234,6 +485,12 @@ int FixWallNurbs::pack_exchange(int i, double* buffer) {
 
 int FixWallNurbs::unpack_exchange(int i, double* buffer) {
   nurbs::PairProof& own = proof(i);
+  if (listed()) {
+    int taken = 0;
+    own = nurbs::PairProof{};
+    own.contact = stages_.unpack_list(buffer, &taken);
+    return taken;
+  }
   std::memcpy(&own, buffer, sizeof own);
   if (own.contact == 0) return nurbs::kProofSize;
   int size = 0;
@@ -243,7 +500,7 @@ int FixWallNurbs::unpack_exchange(int i, double* buffer) {
 
 void FixWallNurbs::write_restart(FILE* file) {
   const nurbs::EnergyLedger& done = stages_.dissipated();
-  double mine[2] = {done.damping, done.friction}, all[2] = {0, 0};
+  double mine[2] = {done.damping, done.friction}, all[3] = {0, 0, time_};
   MPI_Reduce(mine, all, 2, MPI_DOUBLE, MPI_SUM, 0, world);
   if (comm->me != 0) return;
   const int size = sizeof all;
@@ -255,14 +512,14 @@ void FixWallNurbs::restart(char* buffer) {
   const double* values = reinterpret_cast<const double*>(buffer);
   nurbs::EnergyLedger& done = stages_.dissipated();
   done = nurbs::EnergyLedger{};
+  time_ = last_time_ = values[2];
   if (comm->me != 0) return;
   done.damping = values[0];
   done.friction = values[1];
 }
 
 int FixWallNurbs::size_restart(int i) {
-  return 1 + nurbs::kProofSize +
-         (stages_.pool().holds(proof(i).contact) ? stages_.pool().packed_size(proof(i).contact) : 0);
+  return 1 + contacts_size(i);
 }
 
 int FixWallNurbs::pack_restart(int i, double* buffer) {
@@ -277,7 +534,8 @@ void FixWallNurbs::unpack_restart(int i, int nth) {
 }
 
 double FixWallNurbs::memory_usage() {
-  return static_cast<double>(atom->nmax) * sizeof(nurbs::PairProof) + static_cast<double>(stages_.bytes());
+  return static_cast<double>(atom->nmax) * sizeof(nurbs::PairProof) +
+         static_cast<double>(stages_.bytes() + surface_.bytes());
 }
 
 }  // namespace LAMMPS_NS

@@ -1,10 +1,15 @@
-// fix wall/nurbs: an immobile plane for NURBS particles, with the force law of pair gran/nurbs.
-//   fix ID group wall/nurbs plane PX PY PZ NX NY NZ kn KN kt KT [cn CN] [ct CT] mu MU
-// or with the host's contact models (host_models.h) and atom type T for the wall's material:
-//   fix ID group wall/nurbs plane PX PY PZ NX NY NZ type T [radius curvature|volume] model NORMAL [tangential
-//   T] ...
-// The normal points to the particles. Scalar: elastic energy. Vector: force of the particles on the wall
-// (1-3) and its torque about P (4-6).
+// fix wall/nurbs: walls for NURBS particles.
+//   fix ID group wall/nurbs plane PX PY PZ NX NY NZ LAW [move ...]
+//   fix ID group wall/nurbs cylinder x|y|z RADIUS C1 C2 LAW [move ...]
+//   fix ID group wall/nurbs mesh MESHFIX [MESHFIX ...] LAW
+// LAW: that of pair gran/nurbs,
+//   kn KN kt KT [cn CN] [ct CT] mu MU
+// or the host's contact models (host_models.h) with the atom type T for the wall's material:
+//   type T [radius curvature|volume] model NORMAL [tangential T] ...
+// A plane's normal points to the particles; C1, C2 are the cylinder's place across its axis, contact is from
+// inside and outside; MESHFIX are the host's fix mesh/surface, which move with fix move/mesh. move: see
+// wall_motion.h. Scalar: elastic energy. Vector: force of the particles on the wall (1-3) and its torque
+// (4-6) about P, the axis' point, or the lab's origin for meshes.
 #ifdef FIX_CLASS
 
 FixStyle(wall/nurbs,FixWallNurbs)
@@ -21,6 +26,8 @@ FixStyle(wall/nurbs,FixWallNurbs)
 #include "fix.h"
 #include "liggghts/host_models.h"
 #include "liggghts/nurbs_contact.h"
+#include "liggghts/wall_motion.h"
+#include "scene/surface_wall.h"
 
 namespace LAMMPS_NS {
 
@@ -32,9 +39,15 @@ class FixWallNurbs : public Fix {
   // The walls of `lmp`, in the order of the input script.
   static std::vector<FixWallNurbs*> all(LAMMPS* lmp);
 
+  void post_create() override;
+  void pre_delete(bool unfixflag) override;
   int setmask() override;
   void init() override;
   void setup(int vflag) override;
+  void initial_integrate(int vflag) override;
+  void pre_exchange() override;
+  void setup_pre_force(int vflag) override;
+  void pre_force(int) override {}
   void post_force(int vflag) override;
   void reset_dt() override { warn_time_step(); }
   double compute_scalar() override;
@@ -50,7 +63,7 @@ class FixWallNurbs : public Fix {
   int pack_restart(int i, double* buffer) override;
   void unpack_restart(int i, int nth) override;
   int size_restart(int i) override;
-  int maxsize_restart() override { return 1 + nurbs::kProofSize + nurbs::kMostContactSize; }
+  int maxsize_restart() override;
   double memory_usage() override;
 
   // This rank's share. Dissipation is counted while there is a compute nurbs/energy.
@@ -58,15 +71,46 @@ class FixWallNurbs : public Fix {
   const nurbs_host::HostModels* models() const { return models_.get(); }
   const nurbs_host::ContactCounts& counts() const { return stages_.counts(); }
   void append_rows(int groupbit, std::vector<nurbs_host::ContactRow>& rows) const;
+  // Doubles that any of this rank's particles sends at most.
+  int most_exchanged();
 
  private:
-  void parse_plane(int narg, char** arg);
+  struct Mesh {
+    std::string id;
+    class FixMeshSurface* fix = nullptr;
+    class FixNeighlistMesh* list = nullptr;
+    std::vector<int> ids;       // of the triangles
+    std::vector<double> nodes;  // of the last step
+  };
+
+  // Each returns the number of the first word that it has not read.
+  int parse_plane(int narg, char** arg);
+  int parse_cylinder(int narg, char** arg);
+  int parse_mesh(int narg, char** arg);
+  int parse_motion(int narg, char** arg);
   void parse_law(int first, int narg, char** arg);
   nurbs::PairProof& proof(int i) const { return *reinterpret_cast<nurbs::PairProof*>(proofs_[i]); }
   void hand_in_neighbours();
+  bool listed() const { return kind_ != Kind::plane || motion_.moves(); }  // contacts in lists by particle
+  void place_surface();
+  void hand_in_surface();
+  double read_meshes(bool others);
+  void check_meshes();
+  void compute_surface(nurbs::ContactStages::Step& step);
+  void tell_meshes();
+  int contacts_size(int i) const;
   void warn_periodic();
   void warn_time_step();
 
+  using Kind = nurbs::SurfaceWall::Kind;
+  Kind kind_ = Kind::plane;
+  double radius_ = 0;  // of a cylinder, whose axis is normal_
+  nurbs_host::WallMotion motion_;
+  double time_ = 0, last_time_ = 0;  // of the motion; at the last search
+  nurbs::SurfaceWall surface_;
+  std::vector<Mesh> meshes_;
+  std::vector<nurbs::TriangleArray> triangles_;
+  bool meshes_checked_ = false;
   nurbs::Vec3 origin_ = nurbs::Vec3::Zero(), normal_ = nurbs::Vec3::UnitZ();
   nurbs::ContactCoefficients law_;                  // or ...
   std::unique_ptr<nurbs_host::HostModels> models_;  // ... the host's models

@@ -131,7 +131,12 @@ class ContactStages {
   int list_size(std::int32_t head) const;  // doubles
   int pack_list(std::int32_t head, double* to) const;
   std::int32_t unpack_list(const double* from, int* size);
-  int mark(int a) const { return partners_[-2 - a].mark; }  // of a contact with such a body a
+  // Of a contact with such a body a: its mark, and the wall's velocity at the contact point.
+  int mark(int a) const { return partners_[-2 - a].mark; }
+  Vec3 wall_velocity(const ContactView& c) const {
+    const BodyRecord& wall = record(c.a);
+    return load(wall.velocity) + load(wall.spin).cross(load(c.state.arm_a));
+  }
 
   // Sums over the contacts of the last compute: of an owned body, and of the wall (torque about its x).
   // Bodies that are not among `loaded` have none.

@@ -80,7 +80,7 @@ void SurfaceWall::end_near(const std::vector<TriangleArray>& meshes) {
 }
 
 void SurfaceWall::find(const ContactStages::Step& step, const std::vector<TriangleArray>& meshes,
-                       double moved, std::int32_t* const* heads, ContactStages* stages) {
+                       double moved, PairProof* heads, ContactStages* stages) {
   path_ += moved;
   overflows_ = 0;
   if (step.bodies->reshaped()) {
@@ -91,7 +91,7 @@ void SurfaceWall::find(const ContactStages::Step& step, const std::vector<Triang
   const double* path = step.bodies->path();
   for (int body = 0; body + 1 < static_cast<int>(first_.size()); ++body) {
     const bool near = first_[body] < first_[body + 1];
-    std::int32_t* head = heads[body];
+    std::int32_t* head = &heads[body].contact;
     if (*head == 0 && (!near || path[body] + path_ < expiry_[body])) continue;
     if (near)
       find_for(body, step, meshes, head, stages);

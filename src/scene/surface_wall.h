@@ -38,10 +38,10 @@ class SurfaceWall {
   void add_near(int body, int mesh, int triangle) { near_.push_back({body, mesh, triangle}); }
   void end_near(const std::vector<TriangleArray>& meshes);
 
-  // Contacts of this step: to be called between begin_step and end_step of the stages. heads[i]: list of body
-  // i. `moved`: a way that no point of the wall has exceeded since the last call.
+  // Contacts of this step: to be called between begin_step and end_step of the stages. heads[i].contact: list
+  // of body i. `moved`: a way that no point of the wall has exceeded since the last call.
   void find(const ContactStages::Step& step, const std::vector<TriangleArray>& meshes, double moved,
-            std::int32_t* const* heads, ContactStages* stages);
+            PairProof* heads, ContactStages* stages);
 
   double neighbours() const { return static_cast<double>(bodies_near_); }
   // Bodies with more contacts than fit, in the last step.
