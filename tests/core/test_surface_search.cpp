@@ -2,10 +2,10 @@
 // not depend on how the mesh is cut.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <functional>
 #include <map>
-#include <set>
 
 #include "contact/surface_search.h"
 #include "support/bodies.h"
@@ -118,6 +118,7 @@ struct Sum {
   double energy = 0;
   Vec3 force = Vec3::Zero(), torque = Vec3::Zero();
   int count = 0, negative = 0;
+  double deepest = 0;
 };
 
 Sum search(const Particle& p, const Mesh& mesh) {
@@ -136,6 +137,7 @@ Sum search(const Particle& p, const Mesh& mesh) {
     s.force += force;
     s.torque += (c.on_body - 0.5 * c.gap * c.normal).cross(force);
     s.negative += c.weight < 0;
+    s.deepest = std::max(s.deepest, -c.gap);
   }
   return s;
 }
@@ -176,27 +178,18 @@ std::vector<test::ShapePointer> bodies() {
   return {test::sphere(), test::ellipsoid(), test::smooth_pebble()};
 }
 
-// A body moved down on the mesh until it overlaps by about `depth` somewhere.
+// A body moved down on the mesh until it overlaps by about `depth` at the deepest.
 Particle pressed(const test::ShapePointer& shape, const Mesh& mesh, double depth, Random& random,
                  double spread) {
   Particle p;
   p.shape = shape.get();
   p.q = random.turn();
-  p.x = Vec3(random.uniform(-spread, spread), random.uniform(-spread, spread), 3);
-  const auto gap = [&](double z) {
-    p.x[2] = z;
-    double least = 1e300;
-    for (const Triangle& t : mesh.triangles) least = std::min(least, brute_gap(p, {t[0], t[1], t[2]}));
-    return least;
-  };
-  // The least gap is at most the height above the mesh: step down by it.
-  double z = 3;
-  for (int k = 0; k < 30; ++k) {
-    const double g = gap(z) + depth;
-    if (std::abs(g) < 1e-3 * depth) break;
-    z -= std::min(g, 0.15);
+  p.x = Vec3(random.uniform(-spread, spread), random.uniform(-spread, spread), 0);
+  double low = 0, high = 3;
+  for (int k = 0; k < 20; ++k) {
+    p.x[2] = 0.5 * (low + high);
+    (search(p, mesh).deepest > depth ? low : high) = p.x[2];
   }
-  p.x[2] = z;
   return p;
 }
 
@@ -204,7 +197,7 @@ TEST(SurfaceSearch, EnergyIsInclusionAndExclusionOverThePieces) {
   Random random(1);
   int tried = 0, negative = 0, several = 0;
   for (const auto& shape : bodies())
-    for (int round = 0; round < 25; ++round) {
+    for (int round = 0; round < 10; ++round) {
       const double steep = random.log_uniform(0.002, 0.4);
       std::map<std::pair<double, double>, double> heights;
       const Mesh mesh = sheet(
@@ -223,6 +216,163 @@ TEST(SurfaceSearch, EnergyIsInclusionAndExclusionOverThePieces) {
           << shape->name << " round " << round << " contacts " << s.count << " negative " << s.negative;
     }
   std::printf("%d poses, %d with several contacts, %d with negative ones\n", tried, several, negative);
+}
+
+// A body pushed to the mesh anywhere: ridges, valleys and vertices of all slopes, the sheet's border.
+struct Scene {
+  Mesh mesh;
+  Particle body;
+};
+Scene random_scene(const test::ShapePointer& shape, Random& random, double spread = 0.9) {
+  const double steep = random.log_uniform(1e-3, 0.4);
+  std::map<std::pair<double, double>, double> heights;
+  Scene s;
+  s.mesh = sheet(
+      8, 1.0,
+      [&](double x, double y) {
+        return heights.emplace(std::make_pair(x, y), random.uniform(-steep, steep)).first->second;
+      },
+      random);
+  s.body = pressed(shape, s.mesh, random.log_uniform(1e-3, 3e-2), random, spread);
+  return s;
+}
+
+TEST(SurfaceSearch, ForceAndEnergyDoNotKnowHowTheMeshIsCut) {
+  Random random(2);
+  for (const auto& shape : bodies())
+    for (int round = 0; round < 40; ++round) {
+      const Scene scene = random_scene(shape, random);
+      const Sum whole = search(scene.body, scene.mesh);
+      const Mesh fine = cut(cut(scene.mesh, random), random);
+      const Sum parts = search(scene.body, fine);
+      Mesh shuffled = fine;
+      std::shuffle(shuffled.triangles.begin(), shuffled.triangles.end(), random.engine());
+      const Sum other = search(scene.body, shuffled);
+      const double size = whole.force.norm() + 1e-12;
+      EXPECT_NEAR((whole.force - parts.force).norm(), 0, 1e-7 * size) << shape->name << " " << round;
+      EXPECT_NEAR((whole.torque - parts.torque).norm(), 0, 1e-6 * size);
+      EXPECT_NEAR((whole.force - other.force).norm(), 0, 1e-7 * size);
+    }
+}
+
+// One triangle of a conforming sheet is cut at a side's middle, its neighbour is not.
+TEST(SurfaceSearch, SidesThatDoNotConformAreNoBorders) {
+  Mesh mesh, torn;
+  const Vec3 a(-2, -2, 0), b(2, -2, 0), c(2, 2, 0), d(-2, 2, 0);
+  mesh.add(a, b, c);
+  mesh.add(a, c, d);
+  torn.add(a, b, c);
+  const Vec3 middle = 0.5 * (a + c);
+  torn.add(a, middle, d);
+  torn.add(middle, c, d);
+  Random random(3);
+  for (int round = 0; round < 50; ++round) {
+    Particle p;
+    p.shape = test::ellipsoid().get();
+    p.q = random.turn();
+    p.x = Vec3(0, 0, 0.55 + random.uniform(0, 0.3));
+    p.x.head<2>() = round < 25 ? Vec2::Constant(random.uniform(-1, 1)) : Vec2(random.box(-1, 1).head<2>());
+    const Sum one = search(p, mesh), other = search(p, torn);
+    EXPECT_EQ(one.count, other.count);
+    EXPECT_NEAR((one.force - other.force).norm(), 0, 1e-12);
+    EXPECT_LE(one.count, 1);
+  }
+}
+
+TEST(SurfaceSearch, ForceIsTheGradientOfAContinuousEnergy) {
+  Random random(4);
+  int several = 0, negative = 0;
+  for (const auto& shape : bodies())
+    for (int round = 0; round < 40; ++round) {
+      Scene scene = random_scene(shape, random, 1.0);
+      const Vec3 way = random.direction();
+      const double h = 1e-6, stride = 2e-3;
+      Sum last;
+      // Along a path the energy's change is the force's work, and the force does not jump.
+      for (int k = 0; k < 12; ++k) {
+        const Sum here = search(scene.body, scene.mesh);
+        Particle to = scene.body, from = scene.body;
+        to.x += h * way;
+        from.x -= h * way;
+        const double slope = (search(to, scene.mesh).energy - search(from, scene.mesh).energy) / (2 * h);
+        EXPECT_NEAR(-slope, here.force.dot(way), 2e-6 * (here.force.norm() + 1e-4))
+            << shape->name << " " << round << " " << k;
+        if (k > 0) {
+          EXPECT_LT((here.force - last.force).norm(), 4 * stride) << shape->name << " " << round;
+        }
+        last = here;
+        several += here.count > 1;
+        negative += here.negative > 0;
+        scene.body.x += stride * way;
+      }
+    }
+  std::printf("several contacts %d, negative %d\n", several, negative);
+}
+
+// A ball in a trough of facets: as the facets become finer, the force becomes that of the round trough.
+TEST(SurfaceSearch, FinerTroughsAndRollsTendToTheRoundOnes) {
+  for (const bool trough : {true, false}) {
+    const double radius = 4;
+    std::vector<double> errors;
+    for (const int facets : {40, 80, 160, 320, 640}) {
+      Mesh mesh;
+      const auto at = [&](int k, double y) {
+        const double angle = 2 * M_PI * k / facets;
+        return Vec3(radius * std::sin(angle), y,
+                    trough ? radius - radius * std::cos(angle) : radius * std::cos(angle) - radius);
+      };
+      for (int k = -facets / 8; k < facets / 8; ++k) {
+        mesh.add(at(k, -1.5), at(k + 1, -1.5), at(k + 1, 1.5));
+        mesh.add(at(k, -1.5), at(k + 1, 1.5), at(k, 1.5));
+      }
+      double worst = 0;
+      for (int k = 0; k < 37; ++k) {
+        const double overlap = 0.02, angle = 0.01 * k;
+        const double reach = trough ? radius - 1 + overlap : radius + 1 - overlap;
+        Particle p;
+        p.shape = test::sphere().get();
+        p.x = Vec3(reach * std::sin(angle), 0.1,
+                   trough ? radius - reach * std::cos(angle) : reach * std::cos(angle) - radius);
+        const Vec3 normal =
+            (trough ? -1 : 1) * Vec3(std::sin(angle), 0, trough ? -std::cos(angle) : std::cos(angle));
+        worst = std::max(worst, (search(p, mesh).force - overlap * normal).norm() / overlap);
+      }
+      errors.push_back(worst);
+    }
+    std::printf("%s: error of the force", trough ? "trough" : "roll");
+    for (const double e : errors) std::printf(" %.3g", e);
+    std::printf("\n");
+    EXPECT_LT(errors.back(), 0.02);
+    EXPECT_LT(errors.back(), 0.2 * errors[1]);
+  }
+}
+
+TEST(SurfaceSearch, RidgeValleyAndVertex) {
+  Particle ball;
+  ball.shape = test::sphere().get();
+  Mesh ridge, valley, pyramid;
+  for (const double side : {-1.0, 1.0}) {
+    ridge.add(Vec3(0, -3, 0), Vec3(0, 3, 0), Vec3(3 * side, 0, -3));
+    valley.add(Vec3(0, -5, 0), Vec3(0, 5, 0), Vec3(5 * side, 0, 5));
+  }
+  for (int k = 0; k < 4; ++k) {
+    const double a = k * M_PI / 2, b = a + M_PI / 2;
+    pyramid.add(Vec3(0, 0, 0), Vec3(2 * std::cos(a), 2 * std::sin(a), -2),
+                Vec3(2 * std::cos(b), 2 * std::sin(b), -2));
+  }
+  ball.x = Vec3(0.02, 0.3, 0.99);
+  Sum s = search(ball, ridge);
+  EXPECT_EQ(s.count, 1);
+  const Vec3 from_ridge = (ball.x - Vec3(0, 0.3, 0));
+  EXPECT_NEAR((s.force - (1 - from_ridge.norm()) * from_ridge.normalized()).norm(), 0, 1e-12);
+  ball.x = Vec3(0.01, 0.02, 0.99);
+  s = search(ball, pyramid);
+  EXPECT_EQ(s.count, 1);
+  EXPECT_NEAR((s.force - (1 - ball.x.norm()) * ball.x.normalized()).norm(), 0, 1e-10);
+  ball.x = Vec3(0, 0.2, std::sqrt(2.0) * 0.999);
+  s = search(ball, valley);
+  EXPECT_EQ(s.count, 2);
+  EXPECT_NEAR((s.force - Vec3(0, 0, 2 * 0.001 * std::sqrt(0.5))).norm(), 0, 1e-12);
 }
 
 }  // namespace
