@@ -181,12 +181,7 @@ bool ContactStages::serve_flat(ContactBlock& block, int lane, LeftPolygon* left)
 // Towards the polygon's own stiffness; what the springs give up is booked.
 void ContactStages::relax_factor(const ContactBlock& block, int lane, FlatContact& flat,
                                  const PolygonState& state) {
-  if (step_.model != nullptr) {  // what its springs give up is missing at the next step's balance
-    if (flat.polygon.factor < 1) return;
-    relax(flat.polygon, state, kRelaxation);
-    return;
-  }
-  const ContactCoefficients& law = step_.laws[block.law[lane]];
+  const ContactCoefficients law = coefficients(block, lane);  // zeros where a model serves, which books itself
   const double before = flat.polygon.factor;
   double tangential = 0;  // energy at factor 1
   for (int k = 0; k < state.count; ++k) {
