@@ -371,6 +371,17 @@ void PairGranNurbs::append_rows(int groupbit, std::vector<nurbs_host::ContactRow
   });
 }
 
+// The points of a polygon, which follow each other, are one contact.
+void PairGranNurbs::count_contacts(double* count) const {
+  const nurbs::PairProof* last = nullptr;
+  stages_.for_each_contact([&](const nurbs::ContactView& contact) {
+    if (contact.proof == last) return;
+    last = contact.proof;
+    for (const int i : {contact.a, contact.b})
+      if (i < atom->nlocal) ++count[i];
+  });
+}
+
 void PairGranNurbs::write_restart_settings(FILE* file) {
   const double values[] = {settings_.tolerance, static_cast<double>(settings_.solver)};
   std::fwrite(values, sizeof values, 1, file);

@@ -61,6 +61,9 @@ class PairGranNurbs : public PairGran {
   // is listed by the owner of the smaller tag.
   void append_rows(int groupbit, std::vector<nurbs_host::ContactRow>& rows) const;
 
+  // Adds to count[i] the particles that owned particle i touched at the last force evaluation.
+  void count_contacts(double* count) const;
+
   // The contacts themselves, for fix contacthistory, which carries them across ranks and restarts.
   nurbs::ContactStages& stages() { return stages_; }
 

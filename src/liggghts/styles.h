@@ -2,6 +2,7 @@
 // register.cpp reads this list once per kind of style, so it has no include guard, as the host's own
 // style_*.h. Add a style by adding its header here.
 #include "liggghts/atom_vec_nurbs.h"
+#include "liggghts/compute_contact_atom_nurbs.h"
 #include "liggghts/compute_erotate_nurbs.h"
 #include "liggghts/compute_nurbs_atom.h"
 #include "liggghts/compute_nurbs_energy.h"

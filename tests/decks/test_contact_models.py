@@ -292,5 +292,166 @@ class Energy(unittest.TestCase):
         self.assertLess(np.abs(speeds[:, 3:]).max(), 1e-4)
 
 
+# --- the host around it
+
+HEAP_WORDS = "hertz tangential history cohesion sjkr rolling_friction epsd2"
+HEAP_VALUES = {**PLAIN, "coefficientRestitution": 0.5, "coefficientFriction": 0.4}
+HEAP_SHAPES = [models.ellipsoid(1.25, 1.0, 0.8), deck.box_shape(1.0, 0.8, 0.6)]
+
+
+def heap():
+    """Nine bodies that fall together, ellipsoids and boxes."""
+    random = np.random.default_rng(5)
+    return [Body(1 + k % 2, ((k % 3 - 1) * 0.022, (k // 3 - 1) * 0.022, 0.014 + 0.004 * (k % 2)),
+                 tuple(random.uniform(-0.3, 0.3, 3) - 4 * np.array([(k % 3 - 1), (k // 3 - 1), 1]) * 0.08),
+                 unit(*random.normal(size=4)), tuple(random.uniform(-20, 20, 3))) for k in range(9)]
+
+
+class RanksAndRestarts(unittest.TestCase):
+
+    def test_same_bits_on_any_number_of_ranks(self):
+        runs = [run_bodies(heap(), HEAP_SHAPES, HEAP_WORDS, HEAP_VALUES, floor=True, gravity=9.81, dt=2e-5, steps=2500,
+                           ranks=ranks, tolerance=1e-9, commands="dump_modify d sort id") for ranks in (1, 2, 4)]
+        self.assertGreater(runs[0].thermo["held[4]"][-1], 0)
+        for other in runs[1:]:
+            self.assertEqual(runs[0].read("out.dump"), other.read("out.dump"))
+            for name, values in runs[0].thermo.items():
+                self.assertLess(np.abs(values - other.thermo[name]).max(), 1e-12 * np.abs(values).max() + 1e-300)
+
+    def test_restart_in_the_middle_of_contacts(self):
+        """The models come back from the restart by themselves, on another number of ranks."""
+        options = dict(floor=True, gravity=9.81, dt=2e-5, steps=2400, tolerance=1e-9)
+        text, files = bodies_deck(heap(), HEAP_SHAPES, HEAP_WORDS, HEAP_VALUES, commands="dump_modify d sort id",
+                                  end="run 1200\nwrite_restart middle.restart\nrun 1200", **options)
+        whole = deck.run_ok(text, files=files)
+        for pair in ("", f"pair_style gran/nurbs tolerance 1e-9 model {HEAP_WORDS}\npair_coeff * *\n"):
+            with self.subTest(pair):
+                again = text.replace("run 1200\nwrite_restart middle.restart\n", "")
+                head, tail = again.split("read_data bodies.data\n")
+                lines = [line for line in tail.splitlines() if not line.startswith("pair_")]
+                again = "newton off\nread_restart middle.restart\ncommunicate single vel yes\n" + pair + "\n".join(lines)
+                rest = deck.run_ok(again + "\n", ranks=2,
+                                   files={"middle.restart": whole.path / "middle.restart"})
+                frames = rest.read("out.dump").partition("ITEM: TIMESTEP\n1300\n")[2]
+                self.assertTrue(frames)
+                self.assertEqual(whole.read("out.dump").partition("ITEM: TIMESTEP\n1300\n")[2], frames)
+                for name in ("held[1]", "held[2]", "held[3]", "held[4]"):
+                    self.assertAlmostEqual(rest.thermo[name][-1] / whole.thermo[name][-1], 1, delta=1e-9)
+
+
+class HostFeatures(unittest.TestCase):
+
+    def test_check_timestep(self):
+        """Fractions of Rayleigh and Hertz time: of spheres the host's own, of an ellipsoid by its radii and mass."""
+        out = dict(commands="fix check all check/timestep/gran 10 0.001 0.001\n"
+                            "variable a equal f_check[1]\nvariable b equal f_check[2]\nvariable c equal f_check[3]\n"
+                            'fix out all print 10 "${a} ${b} ${c}" file check.txt screen no', steps=20)
+        scene = Scene(PAIR, "hertz tangential history", **out)
+        host, ours = scene.run("sphere"), scene.run("nurbs")
+        np.testing.assert_allclose(np.loadtxt(ours.path / "check.txt"), np.loadtxt(host.path / "check.txt"), rtol=1e-5)
+        run = run_bodies([Body(1, (0, 0, 0), (0.3, 0, 0))], [models.ellipsoid(2.0, 1.0, 0.8)], "hertz", steps=20,
+                         commands=out["commands"])
+        shear, mass = 5e6 / 2.5, 4 / 3 * math.pi * 1.6e-6 * 2500
+        rayleigh = math.pi * 0.008 * math.sqrt(2500 / shear) / (0.1631 * 0.25 + 0.8766)
+        hertz = 2.87 * (mass**2 / (0.01 * MODULUS**2 * 0.6))**0.2
+        found = np.loadtxt(run.path / "check.txt")[-1]
+        self.assertAlmostEqual(found[0] / (1e-5 / rayleigh), 1, delta=1e-3)
+        self.assertAlmostEqual(found[1] / (1e-5 / hertz), 1, delta=1e-3)
+        self.assertIn("rayleigh time", run.screen)
+
+    def test_computes_of_the_host(self):
+        """What other commands show of a contact is what the host's spheres show."""
+        commands = ("compute forces all pair/gran/local id force torque\ncompute touching all contact/atom\n"
+                    "compute stress all stress/atom\ncompute heat all temp\ncompute push all pressure heat\ncompute potential all pe\n"
+                    "dump l all local 50 local.dump c_forces[1] c_forces[2] c_forces[4] c_forces[5] c_forces[6] "
+                    "c_forces[7] c_forces[8] c_forces[9]\n"
+                    'dump_modify l format "%.10g %.10g %.10g %.10g %.10g %.10g %.10g %.10g"\n'
+                    "dump s all custom 50 stress.dump id c_touching c_stress[1] c_stress[2] c_stress[4]\n"
+                    'dump_modify s sort id format "%d %.10g %.10g %.10g %.10g"\n'
+                    "thermo_style custom step c_potential c_push c_heat\nthermo 50")
+        scene = Scene(PAIR, "hertz tangential history rolling_friction epsd2", steps=100, every=50, commands=commands)
+        host, ours = scene.run("sphere"), scene.run("nurbs")
+
+        def local(run):
+            rows = [line.split() for line in run.read("local.dump").splitlines()]
+            rows = [np.array(list(map(float, row))) for row in rows if len(row) == 8]
+            # Where the host lists the pair the other way, its force is that on the other particle.
+            return np.array([row if row[0] < row[1] else np.r_[row[1], row[0], -row[2:5], row[5:]] for row in rows])
+
+        self.assertEqual(local(ours).shape, local(host).shape)
+        self.assertGreater(len(local(ours)), 0)
+        np.testing.assert_allclose(local(ours)[0, :5], local(host)[0, :5], rtol=1e-7)
+        # Later the host asks its models again, with velocities of the end of the step; here are the forces that acted.
+        np.testing.assert_allclose(local(ours)[:, :5], local(host)[:, :5], rtol=2e-2)
+        np.testing.assert_allclose(local(ours)[:, 2], [frame["fx"][0] for _, frame in ours.frames], rtol=1e-7)
+        for (_, a), (_, b) in zip(ours.dump("stress.dump"), host.dump("stress.dump"), strict=True):
+            for name in b:
+                np.testing.assert_allclose(a[name], b[name], rtol=1e-7, atol=1e-14, err_msg=name)
+        np.testing.assert_allclose(ours.thermo["heat"], host.thermo["heat"], rtol=1e-9)
+        np.testing.assert_allclose(ours.thermo["push"], host.thermo["push"], rtol=1e-7)
+        self.assertGreater(ours.thermo["potentia"].max(), 0)  # the host's own models show none
+
+
+class BadInput(unittest.TestCase):
+
+    def expect(self, text, files, *parts):
+        run = deck.run(text, files=files, timeout=60)
+        self.assertNotEqual(run.status, 0)
+        self.assertEqual(len(run.errors), 1, run.screen)
+        for part in parts:
+            self.assertIn(part, run.errors[0])
+
+    def test_words(self):
+        good, files = bodies_deck([Body(1, (0, 0, 0))], [models.ellipsoid(1.0, 1.0, 1.0)], "hertz tangential history")
+        style = "pair_style gran/nurbs tolerance 1e-12  model hertz tangential history"
+        self.assertIn(style, good)
+        for words, parts in {
+                "model hertzz": ("model hertzz must be one of", "hertz/stiffness"),
+                "model": ("model", "must be one of"),
+                "tangential history model hertz": ("unknown keyword tangential", ),
+                "model hertz tangential histroy": ("tangential histroy must be one of off history", ),
+                "model hertz cohesion sjkr tangential history": ("tangential is out of order", ),
+                "model hertz cohesion washino/capillary/viscous": ("washino/capillary/viscous can't be used", ),
+                "model hertz cohesion easo/capillary/viscous": ("easo/capillary/viscous can't be used", ),
+                "model hertz rolling_friction epsd9": ("rolling_friction epsd9 must be one of", ),
+                "model hertz tangential tan_luding": ("need model luding", ),
+                "model hertz surface multicontact": ("surface multicontact can't be used", ),
+                "model hertz surface superquadric": ("surface superquadric can't be used", ),
+                "model hertz computeElasticPotential on": ("computeElasticPotential can't be used", ),
+                "model hertz heating_normal_hertz on": ("heating_normal_hertz can't be used", ),
+                "model hertz tangential_damping maybe": ("tangential_damping", "maybe"),
+                "model hertz tangential_damping": ("tangential_damping needs a value", ),
+                "model hertz nonsense on": ("nonsense", ),
+                "model edinburgh": ("fixKc on", ),
+                "radius large model hertz": ("radius large must be curvature or volume", ),
+                "radius volume": ("must begin with model", ),
+        }.items():
+            with self.subTest(words):
+                self.expect(good.replace(style, "pair_style gran/nurbs " + words), files, "Pair style gran/nurbs", *parts)
+
+    def test_the_wall_and_the_materials(self):
+        good, files = bodies_deck([Body(1, (0, 0, 0.05))], [models.ellipsoid(1.0, 1.0, 1.0)], "hertz tangential history",
+                                  floor=True)
+        wall = "type 1  model hertz tangential history"
+        self.assertIn(wall, good)
+        for words, parts in {"model hertz": ("type T", ), "type 3 model hertz": ("type = 3", "[1, 1]"),
+                             "type 1 model hurtz": ("model hurtz", ), "type 1": ("must begin with model", ),
+                             "type x model hertz": ("type = x", )}.items():
+            with self.subTest(words):
+                self.expect(good.replace(wall, words), files, "Fix wall/nurbs", *parts)
+        for name in ("youngsModulus", "coefficientRestitution", "coefficientFriction"):
+            with self.subTest(name):
+                lines = [line for line in good.splitlines() if name + " " not in line]
+                self.expect("\n".join(lines) + "\n", files, name)
+        self.expect(good.replace("pair_coeff * *", "pair_coeff * * kn 1 kt 1 mu 0"), files, "fix property/global")
+        self.expect(good.replace(" model hertz tangential history\npair", "\npair", 1), files, "Pair coeff * *", "kn KN")
+
+    def test_what_takes_bodies_for_spheres(self):
+        good, files = bodies_deck([Body(1, (0, 0, 0))], [models.ellipsoid(1.0, 1.0, 1.0)], "hertz tangential history")
+        for fix in ("fix x all multicontact/halfspace", "fix x all heat/gran initial_temperature 300"):
+            with self.subTest(fix):
+                self.expect(good.replace("run 0", fix + "\nrun 0"), files, fix.split()[3].split("/")[0])
+
+
 if __name__ == "__main__":
     unittest.main()
