@@ -154,6 +154,7 @@ void FixWallNurbs::parse_law(int first, int narg, char** arg) {
     fail_all(FLERR, lmp,
              "Fix wall/nurbs: type = " + value + " must be an atom type, in [1, " +
                  std::to_string(atom->ntypes) + "]");
+  wall_type_ = static_cast<int>(type);
   models_ = std::make_unique<nurbs_host::HostModels>(lmp, "Fix wall/nurbs", static_cast<int>(type),
                                                      narg - first - 2, arg + first + 2);
   stages_.pool().set_memory_size(nurbs::kModelMemory + models_->history_size());

@@ -66,6 +66,10 @@ class FixWallNurbs : public Fix {
   int maxsize_restart() override;
   double memory_usage() override;
 
+  // The host makes room for the materials of the atom types that it knows to be in use.
+  int min_type() override { return wall_type_; }
+  int max_type() override { return wall_type_; }
+
   // This rank's share. Dissipation is counted while there is a compute nurbs/energy.
   nurbs::EnergyLedger energy() const { return stages_.stored().add(stages_.dissipated(), 1); }
   const nurbs_host::HostModels* models() const { return models_.get(); }
@@ -113,6 +117,7 @@ class FixWallNurbs : public Fix {
   bool meshes_checked_ = false;
   nurbs::Vec3 origin_ = nurbs::Vec3::Zero(), normal_ = nurbs::Vec3::UnitZ();
   nurbs::ContactCoefficients law_;                  // or ...
+  int wall_type_ = 0;                               // its material, if these models serve
   std::unique_ptr<nurbs_host::HostModels> models_;  // ... the host's models
   nurbs::ContactSettings settings_ = nurbs_host::contacts_only();
   AtomVecNurbs* bodies_ = nullptr;

@@ -70,7 +70,8 @@ class Scene:
     dt: float = 1e-5
     steps: int = 600
     every: int = 100  # steps between dumps
-    floor: bool = False  # the plane z = 0 of type 1
+    floor: int = 0  # the plane z = 0 of this type; 0 for none
+    types: int = 2
     gravity: float = 0.0
     box: float = 0.1
     materials: dict = field(default_factory=lambda: MATERIALS)
@@ -89,16 +90,16 @@ class Scene:
     def deck(self, kind):
         nurbs = kind == "nurbs"
         names, settings = self.words()
-        text = ["units si", "atom_style nurbs sphere.json" if nurbs else "atom_style granular", "boundary f f f",
+        text = ["units si", "hard_particles yes", "atom_style nurbs sphere.json" if nurbs else "atom_style granular", "boundary f f f",
                 "newton off", "communicate single vel yes", "read_data bodies.data",
                 f"neighbor {0.2 * min(ball.radius for ball in self.balls)!r} bin", "neigh_modify delay 0",
-                materials(self.materials)]
+                materials(self.materials, self.types)]
         style = f"gran/nurbs tolerance {self.tolerance}" if nurbs else "gran"
         text += [f"pair_style {style} {names} {settings}", "pair_coeff * *"]
         if self.floor and nurbs:
-            text.append(f"fix floor all wall/nurbs plane 0 0 0 0 0 1 type 1 {names} {settings}")
+            text.append(f"fix floor all wall/nurbs plane 0 0 0 0 0 1 type {self.floor} {names} {settings}")
         elif self.floor:
-            text.append(f"fix floor all wall/gran {names} primitive type 1 zplane 0.0 {settings}")
+            text.append(f"fix floor all wall/gran {names} primitive type {self.floor} zplane 0.0 {settings}")
         if self.gravity:
             text.append(f"fix gravity all gravity {self.gravity} vector 0 0 -1")
         text += [f"fix move all {'nve/nurbs' if nurbs else 'nve/sphere'}", f"timestep {self.dt!r}",
@@ -115,7 +116,7 @@ class Scene:
             turn = (1.0, 0.0, 0.0, 0.0) if nurbs else ()
             atoms.append((k + 1, b.kind, *body, *map(float, b.x), *turn))
             velocities.append((k + 1, *map(float, (*b.v, *b.omega))))
-        files = {"bodies.data": deck.data_file(atoms, velocities, ((-self.box, self.box), ) * 3, 2)}
+        files = {"bodies.data": deck.data_file(atoms, velocities, ((-self.box, self.box), ) * 3, self.types)}
         if nurbs:
             files["sphere.json"] = ellipsoid(1.0, 1.0, 1.0)
         return files

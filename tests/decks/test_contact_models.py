@@ -56,7 +56,7 @@ class HostSpheres(unittest.TestCase):
     def test_every_model_moves_nurbs_spheres_as_host_spheres(self):
         for words in COMBINATIONS:
             with self.subTest(words):
-                scene = Scene(PAIR, words, floor=True, gravity=9.81)
+                scene = Scene(PAIR, words, floor=1, gravity=9.81)
                 self.assertLess(difference(scene.run("nurbs"), scene.run("sphere")), 1e-12)
 
     def test_models_that_double_round_off(self):
@@ -70,7 +70,7 @@ class HostSpheres(unittest.TestCase):
                 self.assertLess(difference(scene.run("nurbs"), scene.run("sphere")), 1e-10)
 
     def test_forces_are_good_to_the_tolerance(self):
-        exact = Scene(PAIR, "hertz tangential history", floor=True, steps=100, every=10)
+        exact = Scene(PAIR, "hertz tangential history", floor=1, steps=100, every=10)
         host = exact.run("sphere")
         for tolerance in (1e-9, 1e-6, 1e-3):
             ours = dataclasses.replace(exact, tolerance=tolerance).run("nurbs")
@@ -82,7 +82,7 @@ class HostSpheres(unittest.TestCase):
         self.assertLess(difference(scene.run("nurbs"), scene.run("sphere")), 1e-12)
 
     def test_preloaded_library_leaves_host_spheres_alone(self):
-        scene = Scene(PAIR, "hertz tangential history cohesion sjkr rolling_friction epsd2", floor=True, gravity=9.81)
+        scene = Scene(PAIR, "hertz tangential history cohesion sjkr rolling_friction epsd2", floor=1, gravity=9.81)
         plain = scene.run("sphere", program="/usr/bin/liggghts")
         loaded = scene.run("sphere", program="/usr/bin/liggghts",
                            env={"LD_PRELOAD": str(deck.BUILD / "libliggghts_nurbs.so")})
