@@ -429,6 +429,175 @@ bool make_plane_polygon(const Particle& particle, const Vec3& origin, const Vec3
   return true;
 }
 
+namespace {
+
+// What of a feature lies over a region.
+class RegionClip {
+ public:
+  RegionClip(const PlaneRegion& region, double size) : region_(region), slack_(kClipSlack * size) {
+    u_ = region.normal.unitOrthogonal();
+    v_ = region.normal.cross(u_);
+  }
+  Vec2 project(const Vec3& x) const { return {u_.dot(x - region_.origin), v_.dot(x - region_.origin)}; }
+  double height(const Vec3& x) const { return region_.normal.dot(x - region_.origin); }
+  Vec3 lift(const Vec2& at, double h) const {
+    return region_.origin + at[0] * u_ + at[1] * v_ + h * region_.normal;
+  }
+
+  // Corners of the hull of the part of a polygon; whether it is the whole polygon.
+  bool polygon(const ConvexPolygon& subject, std::vector<Vec2>* hull) const {
+    std::vector<Vec2> points;
+    double area = 0;
+    each_cell([&](const ConvexPolygon& cell) {
+      const ConvexPolygon part = intersect(subject, cell, slack_);
+      if (part.count < 3) return;
+      area += polygon_area(part);
+      points.insert(points.end(), part.corner, part.corner + part.count);
+    });
+    const double full = polygon_area(subject);
+    if (area >= (1 - 1e-9) * full) return true;
+    convex_hull(points, hull);
+    return false;
+  }
+  // The smallest part [low, high] of a segment that has all of it over the region; whether it is the whole.
+  bool segment(const Vec2& p, const Vec2& q, double* low, double* high) const {
+    double covered = 0;
+    *low = 1;
+    *high = 0;
+    each_cell([&](const ConvexPolygon& cell) {
+      SegmentPart part;
+      if (!clip_segment(cell, p, q, slack_, &part)) return;
+      covered += part.t1 - part.t0;
+      *low = std::min(*low, part.t0);
+      *high = std::max(*high, part.t1);
+    });
+    return *low == 0 && *high == 1 && covered >= 1 - 1e-9;
+  }
+  // Distance of points from the region's border.
+  double room(const ConvexPolygon& points) const {
+    double least = kInfinite;
+    for (std::size_t k = 0; k + 1 < region_.border.size(); k += 2) {
+      const Vec2 a = project(region_.border[k]), way = project(region_.border[k + 1]) - a;
+      for (int i = 0; i < points.count; ++i) {
+        const Vec2 x = points.corner[i] - a;
+        const double t = std::clamp(x.dot(way) / way.squaredNorm(), 0.0, 1.0);
+        least = std::min(least, (x - t * way).norm());
+      }
+    }
+    return least;
+  }
+
+ private:
+  template <class Visit>
+  void each_cell(Visit visit) const {
+    int first = 0;
+    for (const int end : region_.ends) {
+      ConvexPolygon cell;
+      for (int k = first; k < end && cell.count < kOutlinePoints; ++k)
+        cell.add(project(region_.corners[k]), 0, 0);
+      if (polygon_area(cell) < 0) std::reverse(cell.corner, cell.corner + cell.count);
+      visit(cell);
+      first = end;
+    }
+  }
+  // Andrew's monotone chain.
+  void convex_hull(std::vector<Vec2>& points, std::vector<Vec2>* hull) const {
+    hull->clear();
+    std::sort(points.begin(), points.end(),
+              [](const Vec2& a, const Vec2& b) { return a[0] != b[0] ? a[0] < b[0] : a[1] < b[1]; });
+    const auto chain = [&](auto from, auto to) {
+      const std::size_t start = hull->size();
+      for (auto p = from; p != to; ++p) {
+        if (!hull->empty() && (*p - hull->back()).norm() <= 2 * slack_) continue;
+        while (hull->size() > start + 1 &&
+               cross2(hull->back() - (*hull)[hull->size() - 2], *p - hull->back()) <=
+                   slack_ * (*p - (*hull)[hull->size() - 2]).norm())
+          hull->pop_back();
+        hull->push_back(*p);
+      }
+      if (!hull->empty()) hull->pop_back();  // the next chain begins with it
+    };
+    chain(points.begin(), points.end());
+    chain(points.rbegin(), points.rend());
+  }
+
+  const PlaneRegion& region_;
+  const double slack_;
+  Vec3 u_, v_;
+};
+
+}  // namespace
+
+RegionContact make_region_polygon(const Particle& particle, const PlaneRegion& region, const Vec3& frame,
+                                  double reach, ContactPolygon* out) {
+  *out = {};
+  const Shape& shape = *particle.shape;
+  if (shape.flats.empty()) return RegionContact::point;
+  const BodyFrame body = body_frame(particle);
+  const auto place = [&](const Vec3& s) -> Vec3 { return body.x + body.scale * (body.axes * s); };
+  const auto to_shape = [&](const Vec3& x) -> Vec3 {
+    return body.axes.transpose() * (x - body.x) / body.scale;
+  };
+  const auto placed = [&](double room) {
+    out->offset = region.normal.dot(region.origin - frame);
+    out->room = room;
+    set_marks(plane_frame(frame), body, out);
+    return RegionContact::polygon;
+  };
+  const SupportSet set = support_set(shape, body.axes.transpose() * -region.normal, reach / body.scale);
+  if (set.count < 2) return RegionContact::point;
+  const auto whole = [&](double room) {
+    if (!make_plane_polygon(particle, region.origin, region.normal, reach, out)) return RegionContact::point;
+    return placed(room);
+  };
+  if (region.unbounded) return whole(kInfinite);
+  const RegionClip clip(region, body.scale * shape.bounding_radius);
+  Candidates points;
+  double size = 0;
+  if (set.face >= 0) {
+    const FlatFace& face = shape.flats.faces[set.face];
+    ConvexPolygon subject;  // clockwise seen from the body's outside
+    for (std::size_t i = face.outline.size(); i-- > 0;)
+      subject.add(clip.project(place(shape.flats.vertices[face.outline[i]])), 0, 0);
+    std::vector<Vec2> hull;
+    if (clip.polygon(subject, &hull)) return whole(clip.room(subject));
+    if (hull.size() < 2) return RegionContact::clear;
+    const Vec3 normal = body.axes * face.normal;
+    const double level = body.scale * face.offset - normal.dot(region.origin - body.x);
+    for (const Vec2& at : hull) {
+      if (points.plane.count == ConvexPolygon::kMost) break;
+      const Vec3 flat = clip.lift(at, 0) - region.origin;
+      const double h = (level - normal.dot(flat)) / normal.dot(region.normal);
+      points.add(at, to_shape(clip.lift(at, h)), h, 0);
+    }
+    for (int i = 0; i < points.plane.count; ++i)
+      size = std::max(size, (points.plane.corner[i] - points.plane.corner[0]).norm());
+  } else {
+    const Vec3 p = place(set.point[0]), q = place(set.point[1]);
+    double low = 0, high = 1;
+    if (clip.segment(clip.project(p), clip.project(q), &low, &high)) {
+      ConvexPolygon ends;
+      ends.add(clip.project(p), 0, 0);
+      ends.add(clip.project(q), 0, 0);
+      return whole(clip.room(ends));
+    }
+    if (!(high > low)) return RegionContact::clear;
+    size = (high - low) * (q - p).norm();
+    for (const double t : {low, high}) {
+      const Vec3 x = p + t * (q - p);
+      points.add({t, 0}, to_shape(x), clip.height(x), 0);
+      points.plane.corner[points.plane.count - 1] = {t * (q - p).norm(), 0};
+    }
+    out->rolling = set.ruled ? 1 : 0;
+  }
+  const int rolling = out->rolling;
+  if (!finish(points, reach, nullptr, out)) return RegionContact::point;
+  out->rolling = rolling;
+  out->factor = 1;
+  store(region.normal, out->normal);
+  return placed(kSlideShare * size);
+}
+
 bool make_pair_polygon(const Particle& pa, const Particle& pb, const Vec3& normal, double overlap,
                        double reach, const ContactPolygon* old, ContactPolygon* out) {
   *out = {};

@@ -42,6 +42,7 @@
 
 #include <cstdint>
 #include <type_traits>
+#include <vector>
 
 #include "body/convex_polygon.h"
 #include "contact/contact.h"
@@ -92,6 +93,23 @@ BodyFrame plane_frame(const Vec3& origin);
 // 11 us for a rounded box: mostly one support search from a cold start.
 bool make_plane_polygon(const Particle& particle, const Vec3& origin, const Vec3& normal, double reach,
                         ContactPolygon* out);
+
+// The part of a plane that is wall: convex cells, as a triangle mesh has them, lab.
+struct PlaneRegion {
+  Vec3 origin = Vec3::Zero(), normal = Vec3::Zero();  // unit, towards the particle
+  bool unbounded = false;                             // all of the plane
+  std::vector<Vec3> corners;                          // of the cells, in order around each
+  std::vector<int> ends;                              // behind each cell's last corner
+  std::vector<Vec3> border;                           // pairs of ends of the region's sides
+};
+
+// The contact of a particle with a region of a plane. `frame`: the fixed point of the wall that arms and
+// marks are counted from. Of a face, crease or ruled line that reaches over the border the part over the
+// region counts: its points are the corners of the hull of that part, which need not be convex itself.
+// `clear`: a feature meets the plane, but not over the region.
+enum class RegionContact { point, clear, polygon };
+RegionContact make_region_polygon(const Particle& particle, const PlaneRegion& region, const Vec3& frame,
+                                  double reach, ContactPolygon* out);
 
 // The contact of two particles touching with `normal` (A to B, lab) and `overlap`, as the ladder found them;
 // the normal need only be good to some degrees, as the faces supply theirs. Candidates for the reference are

@@ -10,13 +10,15 @@
 namespace nurbs {
 namespace {
 
-constexpr double kSameNormal = 0.9;  // cosine: a former contact this near has a start for the search
+constexpr double kSamePlane = 1 - 1e-6;  // cosine: a former contact's polygon stood on this plane
+constexpr double kSameNormal = 0.9;      // cosine: a former contact this near has a start for the search
 
 // A plane that the body overlaps.
 struct ActivePlane {
   bool active = false;
-  Vec3 normal;   // towards the body
-  Vec3 deepest;  // the body's point, relative to its centre
+  bool claimed = false;  // by a flat feature
+  Vec3 normal;           // towards the body
+  Vec3 deepest;          // the body's point, relative to its centre
   ContactResult result;
   PairMemory memory;
 };
@@ -30,6 +32,7 @@ struct MetEdge {
 struct Workspace {
   std::vector<ActivePlane> planes;
   std::vector<MetEdge> edges;
+  PlaneRegion region;
 };
 Workspace& workspace() {
   static thread_local Workspace w;
@@ -58,8 +61,11 @@ class SurfaceSearch {
     bool any = false;
     for (std::size_t p = 0; p < patch_.planes().size(); ++p) any = look_at_plane(static_cast<int>(p)) || any;
     if (any) {
-      for (std::size_t p = 0; p < patch_.planes().size(); ++p)
-        if (planes_[p].active) touch_face(static_cast<int>(p));
+      for (std::size_t p = 0; p < patch_.planes().size(); ++p) {
+        if (!planes_[p].active) continue;
+        planes_[p].claimed = !particle_.shape->flats.empty() && stand_on(static_cast<int>(p));
+        if (!planes_[p].claimed) touch_face(static_cast<int>(p));
+      }
       edges_.assign(patch_.edges().size(), MetEdge{});
       for (std::size_t e = 0; e < edges_.size(); ++e) touch_edge(static_cast<int>(e));
       for (std::size_t v = 0; v < patch_.vertices().size(); ++v) touch_vertex(static_cast<int>(v));
@@ -84,6 +90,25 @@ class SurfaceSearch {
     if (!memory || !(memory->on_b.patch >= 0)) return nullptr;
     *point = {static_cast<int>(memory->on_b.patch), memory->on_b.u, memory->on_b.v};
     return point;
+  }
+
+  // Whether a flat feature of the body meets the plane, over the wall or beside it.
+  bool stand_on(int number) {
+    const ActivePlane& met = planes_[number];
+    bool stands = false;
+    for (int k = 0; k < former_count_ && !stands; ++k)
+      stands = former_[k].flat && former_[k].normal.dot(met.normal) > kSamePlane;
+    if (!stands) {
+      PlaneRegion& region = workspace().region;
+      plane_region(patch_, number, particle_.x, &region);
+      ContactPolygon polygon;
+      const RegionContact contact =
+          make_region_polygon(particle_, region, particle_.x, -kReach * met.result.gap, &polygon);
+      if (contact == RegionContact::point) return false;
+      if (contact == RegionContact::clear) return true;
+    }
+    add_plane(number, patch_.unbounded() ? 0 : patch_.planes()[number].leader, true);
+    return true;
   }
 
   // The ladder of a plane; true if the body overlaps it.
@@ -156,8 +181,13 @@ class SurfaceSearch {
       const int cell = patch_.cell_in(plane.first + i);
       if (holds(cell, met)) triangle = patch_.cells()[cell].triangle;
     }
-    if (triangle < 0) return;
+    if (triangle >= 0) add_plane(number, triangle, false);
+  }
+
+  void add_plane(int number, int triangle, bool flat) {
+    const ActivePlane& met = planes_[number];
     SurfaceContact c;
+    c.flat = flat;
     c.gap = met.result.gap;
     c.normal = met.normal;
     c.on_body = met.deepest;
@@ -200,15 +230,17 @@ class SurfaceSearch {
     return true;
   }
 
-  bool all_active(const MeshPatch::Edge& e) const {
-    for (int i = e.first_side; i < e.first_side + e.sides; ++i)
-      if (!planes_[patch_.cells()[patch_.side(i).cell].plane].active) return false;
+  bool all_open(const MeshPatch::Edge& e) const {
+    for (int i = e.first_side; i < e.first_side + e.sides; ++i) {
+      const ActivePlane& met = planes_[patch_.cells()[patch_.side(i).cell].plane];
+      if (!met.active || met.claimed) return false;
+    }
     return true;
   }
 
   void touch_edge(int number) {
     const MeshPatch::Edge& e = patch_.edges()[number];
-    if (e.inner || !all_active(e)) return;
+    if (e.inner || !all_open(e)) return;
     int weight = 1;
     for (int i = e.first_side; i < e.first_side + e.sides; ++i) {
       const MeshPatch::Side& side = patch_.side(i);
@@ -260,19 +292,14 @@ class SurfaceSearch {
     if (v.inner || v.cells == 0) return;
     if ((particle_.x - v.x).squaredNorm() > radius_ * radius_) return;
     const ActivePlane* shallowest = nullptr;
-    int first_plane = -1;
-    bool corner = false;  // else one straight line and one plane: the edges say all
     for (int i = 0; i < v.cells; ++i) {
       const int plane = patch_.cells()[patch_.cell_at(v.first_cell + i)].plane;
       const ActivePlane& met = planes_[plane];
-      if (!met.active) return;
+      if (!met.active || met.claimed) return;
       if (!shallowest || met.result.gap > shallowest->result.gap) shallowest = &met;
-      if (first_plane < 0) first_plane = plane;
-      corner = corner || plane != first_plane;
     }
     for (int i = 0; i < v.edges; ++i)
       if (edges_[patch_.edge_at(v.first_edge + i)].state == MetEdge::clear) return;
-    (void)corner;
     SurfacePoint start;
     const FeatureContact f =
         find_point_contact(particle_, v.x, shallowest->normal, point_for(shallowest->normal, &start));
@@ -344,6 +371,27 @@ class SurfaceSearch {
 };
 
 }  // namespace
+
+void plane_region(const MeshPatch& patch, int number, const Vec3& body, PlaneRegion* region) {
+  const MeshPatch::Plane& plane = patch.planes()[number];
+  region->origin = plane.origin;
+  region->normal = plane.normal.dot(body - plane.origin) < 0 ? Vec3(-plane.normal) : plane.normal;
+  region->unbounded = patch.unbounded();
+  region->corners.clear();
+  region->ends.clear();
+  region->border.clear();
+  for (int i = 0; i < plane.cells; ++i) {
+    const MeshPatch::Cell& cell = patch.cells()[patch.cell_in(plane.first + i)];
+    for (int k = 0; k < cell.corners; ++k) {
+      const Vec3& x = patch.vertices()[patch.corner(cell.first + k)].x;
+      region->corners.push_back(x);
+      if (patch.edges()[patch.edge_of(cell.first + k)].inner) continue;
+      region->border.push_back(x);
+      region->border.push_back(patch.vertices()[patch.corner(cell.first + (k + 1) % cell.corners)].x);
+    }
+    region->ends.push_back(static_cast<int>(region->corners.size()));
+  }
+}
 
 void SurfaceContacts::add(const SurfaceContact& c) {
   if (count == kSurfaceContacts) {

@@ -19,6 +19,7 @@
 // sharp valley gives two contacts, as its bottom line does not touch.
 #pragma once
 
+#include "contact/contact_polygon.h"
 #include "contact/feature_search.h"
 #include "contact/mesh_patch.h"
 #include "contact/pair_memory.h"
@@ -32,6 +33,7 @@ struct SurfaceContact {
   Vec3 on_body = Vec3::Zero();  // deepest point, relative to the body's centre of mass, lab axes
   int triangle = -1;            // one that has the point, as numbered in the patch
   int plane = -1;               // of the patch, for faces; else -1
+  bool flat = false;            // a flat face, crease or ruled line stands on the plane
   Rung rung = Rung::none;
   int iterations = 0;
   bool converged = true;
@@ -42,6 +44,7 @@ struct SurfaceContact {
 struct FormerContact {
   Vec3 normal;
   const PairMemory* memory;
+  bool flat;  // has a polygon
 };
 
 constexpr int kSurfaceContacts = 32;
@@ -54,6 +57,12 @@ struct SurfaceContacts {
   void add(const SurfaceContact& c);
 };
 
+// The region that a plane of the patch is.
+void plane_region(const MeshPatch& patch, int plane, const Vec3& body, PlaneRegion* region);
+
+// A body whose flat face, crease or ruled line stands on a plane has one contact with all of that plane, and
+// none with its edges: contact_polygon.h has the points.
+//
 // `path`: the body's and the wall's, as in Bodies::path; planes that the body is proven clear of are not
 // looked at before it has gone far enough. `former`: contacts of the last step, whose memory is gone on from.
 void find_surface_contacts(const Particle& particle, MeshPatch& patch, const ContactSettings& settings,

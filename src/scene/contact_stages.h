@@ -62,6 +62,8 @@ struct WallContact {
   double weight = 1;     // +1, or below 0: what other contacts count twice
   Vec3 velocity = Vec3::Zero(), spin = Vec3::Zero();  // of the wall at point_a; lab
   int mark = 0;                                       // the caller's
+  const PlaneRegion* region =
+      nullptr;  // that a flat feature of the body stands on, until the end of the step
   PairMemory memory;
 };
 
@@ -123,7 +125,7 @@ class ContactStages {
   void give(int body, std::int32_t* head, const WallContact* found, int count);
   void end_step(double neighbours);
   // The memory of a body's contacts and their normals, where the next search goes on; how many.
-  int former(std::int32_t head, Vec3* normals, PairMemory* memories) const;
+  int former(std::int32_t head, Vec3* normals, PairMemory* memories, bool* flat) const;
   // After bodies were renumbered or have left: begin, a call per body with a list, end. Others are dropped.
   void begin_lists();
   void keep_list(int body, std::int32_t head);
@@ -225,18 +227,23 @@ class ContactStages {
     std::int32_t next = 0;  // contact of the same body
     int mark = 0;
     bool seen = false;
+    double body[3] = {};                  // where the body was in the last step
+    const PlaneRegion* region = nullptr;  // of this step
   };
   Partner& partner(std::int32_t number) { return partners_[number - 1]; }
   const Partner& partner(std::int32_t number) const { return partners_[number - 1]; }
   std::int32_t add_listed(const ContactRecord& record);
   std::int32_t adopt_listed(std::int32_t number);
+  void bind_listed(std::int32_t number, int body);
   void drop_listed(std::int32_t number);
+  void end_listed(std::int32_t number);
   void inherit(std::int32_t number, std::int32_t parent, const WallContact& found);
   void count_listed(const WallContact& found, std::int32_t number, int body);
   void update_listed(std::int32_t number, int body, const WallContact& found);
 
   // Flat faces, creases and ruled lines: flat_stage.cpp.
   bool may_be_flat(int a, int b) const;
+  Vec3 wall_frame(int a) const;
   bool find_polygon(int a, int b, const Vec3& normal, double overlap, double reach, const ContactPolygon* old,
                     ContactPolygon* polygon) const;
   void finish(const ContactCoefficients& law, int a, int b, const ContactState& state);

@@ -65,8 +65,13 @@ bool rests(const ContactState& state) {
 }  // namespace
 
 bool ContactStages::may_be_flat(int a, int b) const {
-  return record(b).flat != 0 && a >= -1 && (a < 0 || record(a).flat != 0) &&
-         step_.settings.solver == Solver::ladder;
+  if (a < -1) return partners_[-2 - a].region != nullptr && step_.settings.solver == Solver::ladder;
+  return record(b).flat != 0 && (a < 0 || record(a).flat != 0) && step_.settings.solver == Solver::ladder;
+}
+
+// The wall's point that a polygon's arms are counted from.
+Vec3 ContactStages::wall_frame(int a) const {
+  return a < 0 ? load(record(a).x) : Vec3(Vec3::Zero());
 }
 
 // Energy that left the springs.
@@ -74,19 +79,24 @@ void ContactStages::book(double energy, int a, int b) {
   if (step_.ledger) dissipated_.damping += share(a, b) * energy;
 }
 
-static PolygonState now(const ContactPolygon& polygon, const Bodies& bodies, const BodyRecord* wall, int a,
-                        int b) {
+static PolygonState now(const ContactPolygon& polygon, const Bodies& bodies, const Vec3& wall, int a, int b) {
   const BodyArrays& arrays = bodies.arrays();
   const auto frame = [&](int i) {
     return frame_of(bodies.record(i), arrays.scale[i], arrays.shapes[arrays.shape[i]]);
   };
-  return evaluate(polygon, a < 0 ? plane_frame(load(wall->x)) : frame(a), frame(b));
+  return evaluate(polygon, a < 0 ? plane_frame(wall) : frame(a), frame(b));
 }
 
 // The polygon of two bodies that touch, or of a body and the wall; false where they meet at a point.
 bool ContactStages::find_polygon(int a, int b, const Vec3& normal, double overlap, double reach,
                                  const ContactPolygon* old, ContactPolygon* polygon) const {
   const Particle body = step_.bodies->particle(b);
+  if (a < -1) {
+    const PlaneRegion* region = partners_[-2 - a].region;
+    return region != nullptr &&
+           make_region_polygon(body, *region, wall_frame(a), reach, polygon) == RegionContact::polygon &&
+           polygon->count >= 2;
+  }
   const bool made =
       a < 0 ? make_plane_polygon(body, load(step_.wall->x), step_.wall_normal, reach, polygon)
             : make_pair_polygon(step_.bodies->particle(a), body, normal, overlap, reach, old, polygon);
@@ -108,7 +118,7 @@ bool ContactStages::make_flat(ContactBlock& block, int lane, const Results& sing
   const double overlap = -single.gap[lane];
   ContactPolygon polygon;
   if (!find_polygon(a, b, single.normal_of(lane), overlap, kReach * overlap, nullptr, &polygon)) return false;
-  const PolygonState state = now(polygon, *step_.bodies, step_.wall, a, b);
+  const PolygonState state = now(polygon, *step_.bodies, wall_frame(a), a, b);
   if (!(state.energy > 0)) return false;
   const double weight = block.field[kWeight][lane];
   polygon.factor = continuity_factor(0.5 * weight * overlap * overlap, polygon, state);
@@ -119,8 +129,12 @@ bool ContactStages::make_flat(ContactBlock& block, int lane, const Results& sing
   FlatContact& flat = pool_.add_flat(block.proof[lane]->contact);
   flat.polygon = polygon;
   flat.points.used = (1u << polygon.count) - 1;
-  bind(block.neighbour[lane]);
-  set_law(block.neighbour[lane]);
+  if (a < -1) {
+    bind_listed(-1 - a, b);
+  } else {
+    bind(block.neighbour[lane]);
+    set_law(block.neighbour[lane]);
+  }
   if (old.active != 0 && step_.model != nullptr) {
     double memory[kMostModelMemory];
     std::copy_n(pool_.memory(block, lane), pool_.memory_size(), memory);
@@ -152,7 +166,7 @@ bool ContactStages::make_flat(ContactBlock& block, int lane, const Results& sing
 bool ContactStages::serve_flat(ContactBlock& block, int lane, LeftPolygon* left) {
   const int a = block.a[lane], b = block.b[lane];
   FlatContact& flat = *pool_.flat_of(block, lane);
-  PolygonState state = now(flat.polygon, *step_.bodies, step_.wall, a, b);
+  PolygonState state = now(flat.polygon, *step_.bodies, wall_frame(a), a, b);
   const PolygonVerdict verdict = judge(flat.polygon, state);
   if (!step_.setup && verdict != PolygonVerdict::keep) {
     const Particle body = step_.bodies->particle(b);
@@ -160,8 +174,7 @@ bool ContactStages::serve_flat(ContactBlock& block, int lane, LeftPolygon* left)
     bool stays = verdict != PolygonVerdict::open;
     double overlap = -state.least;
     if (stays) {
-      const double deepest = support_gap(flat.polygon, a < 0 ? nullptr : &first, body,
-                                         a < 0 ? load(step_.wall->x) : Vec3(Vec3::Zero()));
+      const double deepest = support_gap(flat.polygon, a < 0 ? nullptr : &first, body, wall_frame(a));
       if (verdict == PolygonVerdict::moved || outgrown(state, deepest)) {
         overlap = std::max(overlap, -deepest);
         stays = remake(block, lane, flat, state, overlap);
@@ -202,7 +215,7 @@ bool ContactStages::remake(ContactBlock& block, int lane, FlatContact& flat, Pol
   ContactPolygon polygon;
   if (!find_polygon(a, b, state.normal, overlap, kKeptReach * overlap, &flat.polygon, &polygon)) return false;
   polygon.factor = flat.polygon.factor;
-  const PolygonState fresh = now(polygon, *step_.bodies, step_.wall, a, b);
+  const PolygonState fresh = now(polygon, *step_.bodies, wall_frame(a), a, b);
   // Springs may lose energy here, which is booked, but gain none.
   const double held = stored_energy(flat.polygon, state), holds = stored_energy(polygon, fresh);
   if (holds > held) polygon.factor *= held / holds;

@@ -83,6 +83,7 @@ void SurfaceWall::find(const ContactStages::Step& step, const std::vector<Triang
                        double moved, PairProof* heads, ContactStages* stages) {
   path_ += moved;
   overflows_ = 0;
+  regions_used_ = 0;
   if (step.bodies->reshaped()) {
     std::fill(expiry_.begin(), expiry_.end(), -kFarAway);
     std::fill(patch_of_.begin(), patch_of_.end(), -1);
@@ -104,8 +105,8 @@ void SurfaceWall::find_for(int body, const ContactStages::Step& step,
                            const std::vector<TriangleArray>& meshes, std::int32_t* head,
                            ContactStages* stages) {
   FormerContact former[ContactStages::kMostListed];
-  const int formers = stages->former(*head, former_normals_, former_memories_);
-  for (int k = 0; k < formers; ++k) former[k] = {former_normals_[k], former_memories_ + k};
+  const int formers = stages->former(*head, former_normals_, former_memories_, former_flat_);
+  for (int k = 0; k < formers; ++k) former[k] = {former_normals_[k], former_memories_ + k, former_flat_[k]};
   const Particle particle = step.bodies->particle(body);
   if (!finite(particle)) return stages->give(body, head, nullptr, 0);
   if (kind_ == Kind::cylinder)
@@ -118,6 +119,12 @@ void SurfaceWall::find_for(int body, const ContactStages::Step& step,
     const SurfaceContact& c = contacts_.contact[k];
     WallContact& f = found_[k];
     f.weight = c.weight;
+    f.region = nullptr;
+    if (c.flat) {
+      if (regions_used_ == regions_.size()) regions_.emplace_back();
+      plane_region(*patches_[patch_of_[body]], c.plane, particle.x, &regions_[regions_used_]);
+      f.region = &regions_[regions_used_++];
+    }
     f.memory = c.memory;
     ContactResult& r = f.result;
     r = ContactResult{};

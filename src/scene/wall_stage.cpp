@@ -9,8 +9,9 @@
 namespace nurbs {
 namespace {
 
-constexpr double kSameSide = 0.7;            // cosine between normals: 45 degrees
-constexpr int kListedSize = 4 + kProofSize;  // doubles of a listed contact beside its record: x, mark, proof
+constexpr double kSameSide = 0.7;  // cosine between normals: 45 degrees
+constexpr int kListedSize =
+    7 + kProofSize;  // doubles of a listed contact beside its record: x, mark, body, proof
 
 }  // namespace
 
@@ -25,14 +26,25 @@ std::int32_t ContactStages::adopt_listed(std::int32_t number) {
   p = Partner{};
   for (int k = 0; k < 9; k += 4) p.record.turn[k] = 1;
   p.record.radius = kFarAway;
-  ContactBlock& block = pool_.block(number);
-  const int lane = ContactPool::lane(number);
-  block.proof[lane] = &p.proof;
-  block.neighbour[lane] = -1;
-  block.a[lane] = -1 - number;
-  block.law[lane] = 0;
-  block.fresh[lane] = 0;
+  bind_listed(number, 0);
   return number;
+}
+
+// Tells the contact, and its polygon, whose it is.
+void ContactStages::bind_listed(std::int32_t number, int body) {
+  Partner& p = partner(number);
+  const auto set = [&](ContactBlock& block, int lane) {
+    block.proof[lane] = &p.proof;
+    block.neighbour[lane] = -1;
+    block.a[lane] = -1 - number;
+    block.b[lane] = body;
+    block.law[lane] = step_.laws == nullptr ? 0 : law_of(-1, body);
+    block.fresh[lane] = 0;
+  };
+  p.proof.contact = number;
+  set(pool_.block(number), ContactPool::lane(number));
+  if (FlatContact* flat = pool_.flat(number))
+    for (int lane = 0; lane < kBlock; ++lane) set(flat->points, lane);
 }
 
 void ContactStages::drop_listed(std::int32_t number) {
@@ -40,7 +52,7 @@ void ContactStages::drop_listed(std::int32_t number) {
   partner(number).next = 0;
 }
 
-int ContactStages::former(std::int32_t head, Vec3* normals, PairMemory* memories) const {
+int ContactStages::former(std::int32_t head, Vec3* normals, PairMemory* memories, bool* flat) const {
   int count = 0;
   for (; head != 0 && count < kMostListed; head = partner(head).next) {
     const ContactBlock& block = pool_.blocks()[(head - 1) / kBlock];
@@ -48,6 +60,9 @@ int ContactStages::former(std::int32_t head, Vec3* normals, PairMemory* memories
     double normal[3];
     block.get(lane, kStateField + 3, 3, normal);
     normals[count] = load(normal);
+    const double polygon = block.field[kFlat][lane];
+    flat[count] = polygon != 0;
+    if (flat[count]) normals[count] = load(pool_.flats()[static_cast<int>(polygon) - 1].polygon.normal);
     PairMemory& m = memories[count++];
     m.proof = partner(head).proof;
     block.get(lane, kLocalModelSize, 10, &m.on_a);
@@ -66,8 +81,13 @@ void ContactStages::update_listed(std::int32_t number, int body, const WallConta
   store(found.spin, p.record.spin);
   store(found.spin, p.record.spin_before);
   p.mark = found.mark;
-  block.b[lane] = body;
-  block.law[lane] = law_of(-1, body);
+  p.region = found.region;
+  store(load(step_.bodies->record(body).x), p.body);
+  bind_listed(number, body);
+  if (FlatContact* flat = pool_.flat(number); flat && p.region) {  // the wall may have moved
+    store(p.region->normal, flat->polygon.normal);
+    flat->polygon.offset = p.region->normal.dot(p.region->origin - x);
+  }
   if (found.weight < 0) block.field[kWeight][lane] = found.weight;
   ContactResult r = found.result;
   r.point_a -= x;
@@ -94,12 +114,19 @@ void ContactStages::give(int body, std::int32_t* head, const WallContact* found,
     ContactState state;
     block.get(lane, kStateField, kContactStateSize, &state);
     BodyRecord& wall = partner(n).record;
-    if (state.active != 0) {  // a body that comes back through a periodic border takes its walls along
-      const Vec3 moved = load(b.x) - (load(wall.x) + load(state.arm_a) - load(state.arm_b));
-      if (moved.squaredNorm() > b.radius * b.radius) store(Vec3(load(wall.x) + moved), wall.x);
+    // A body that comes back through a periodic border takes its walls along.
+    const Vec3 moved = load(b.x) - load(partner(n).body);
+    if (moved.squaredNorm() > b.radius * b.radius) store(Vec3(load(wall.x) + moved), wall.x);
+    Vec3 normal = load(state.normal), point = load(wall.x) + load(state.arm_a);
+    if (const FlatContact* flat = pool_.flat(n)) {
+      const ContactPolygon& polygon = flat->polygon;
+      normal = load(polygon.normal);
+      Vec3 middle = Vec3::Zero();
+      for (int k = 0; k < polygon.count; ++k) middle += load(polygon.point[k]) / polygon.count;
+      const Particle particle = step_.bodies->particle(body);
+      point = particle.x + particle.scale * (particle.q * middle);
     }
-    old[olds++] = {n, load(state.normal), load(wall.x) + load(state.arm_a), block.field[kWeight][lane],
-                   false};
+    old[olds++] = {n, normal, point, block.field[kWeight][lane], false};
     reentrant = reentrant || block.field[kWeight][lane] < 0;
   }
   count = std::min(count, kMostListed);
@@ -157,8 +184,7 @@ void ContactStages::give(int body, std::int32_t* head, const WallContact* found,
   }
   for (int i = 0; i < olds; ++i) {
     if (old[i].taken) continue;
-    close(pool_.block(old[i].number), ContactPool::lane(old[i].number));
-    drop_listed(old[i].number);
+    end_listed(old[i].number);
   }
   for (int k = 0; k < count; ++k) {
     *link = number[k];
@@ -166,6 +192,18 @@ void ContactStages::give(int body, std::int32_t* head, const WallContact* found,
   }
   *link = 0;
   *head = first;
+}
+
+// Ends a contact that was not found again.
+void ContactStages::end_listed(std::int32_t number) {
+  ContactBlock& block = pool_.block(number);
+  const int lane = ContactPool::lane(number);
+  if (FlatContact* flat = pool_.flat(number)) {
+    for (int k = 0; k < kBlock; ++k)
+      if (flat->points.used >> k & 1) close(flat->points, k);
+  }
+  close(block, lane);
+  drop_listed(number);
 }
 
 // A contact that appears with its counterpart, or in place of one, has the spring of the one it comes from.
@@ -193,9 +231,9 @@ void ContactStages::inherit(std::int32_t number, std::int32_t parent, const Wall
                            stored_energy(law, state).tangential_spring;
 }
 
-// A contact that takes another off is none to be counted.
+// A contact that takes another off is none to be counted, and of a polygon its points are.
 void ContactStages::count_listed(const WallContact& found, std::int32_t number, int body) {
-  if (found.weight < 0)
+  if (found.weight < 0 || pool_.flat(number) != nullptr)
     counts_.value[ContactCounts::iterations] += found.result.iterations;
   else
     count(found.result, -1 - number, body);
@@ -210,7 +248,7 @@ void ContactStages::begin_lists() {
 void ContactStages::keep_list(int body, std::int32_t head) {
   for (; head != 0; head = partner(head).next) {
     partner(head).seen = true;
-    pool_.block(head).b[ContactPool::lane(head)] = body;
+    bind_listed(head, body);
   }
 }
 
@@ -233,7 +271,8 @@ int ContactStages::pack_list(std::int32_t head, double* to) const {
     const Partner& p = partner(head);
     std::memcpy(to + m, p.record.x, 3 * sizeof(double));
     to[m + 3] = p.mark;
-    std::memcpy(to + m + 4, &p.proof, sizeof p.proof);
+    std::memcpy(to + m + 4, p.body, 3 * sizeof(double));
+    std::memcpy(to + m + 7, &p.proof, sizeof p.proof);
     m += kListedSize;
     m += pool_.pack(head, to + m);
   }
@@ -253,7 +292,8 @@ std::int32_t ContactStages::unpack_list(const double* from, int* size) {
     Partner& p = partner(number);
     std::memcpy(p.record.x, values, 3 * sizeof(double));
     p.mark = static_cast<int>(values[3]);
-    std::memcpy(&p.proof, values + 4, sizeof p.proof);
+    std::memcpy(p.body, values + 4, 3 * sizeof(double));
+    std::memcpy(&p.proof, values + 7, sizeof p.proof);
     p.proof.contact = number;
     if (last == 0)
       first = number;
