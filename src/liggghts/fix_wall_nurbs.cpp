@@ -122,7 +122,7 @@ int FixWallNurbs::parse_mesh(int narg, char** arg) {
   return k;
 }
 
-// The words of `move` at the end; how many are left before them.
+// Reads `move` and its words, and puts them behind all others; how many these are.
 int FixWallNurbs::parse_motion(int narg, char** arg) {
   for (int k = 3; k < narg; ++k) {
     if (std::strcmp(arg[k], "move") != 0) continue;
@@ -130,11 +130,8 @@ int FixWallNurbs::parse_motion(int narg, char** arg) {
       fail_all(FLERR, lmp,
                "Fix wall/nurbs mesh: move is for planes and cylinders; meshes have fix move/mesh");
     const int taken = motion_.parse(lmp, "Fix wall/nurbs", narg - k - 1, arg + k + 1);
-    if (k + 1 + taken < narg)
-      fail_all(
-          FLERR, lmp,
-          std::string("Fix wall/nurbs: ") + arg[k + 1 + taken] + " is too much after move, which comes last");
-    return k;
+    std::rotate(arg + k, arg + k + 1 + taken, arg + narg);
+    return parse_motion(narg - 1 - taken, arg);
   }
   return narg;
 }

@@ -1,0 +1,322 @@
+#!/usr/bin/python3
+"""fix wall/nurbs on meshes, cylinders and planes that move: the same motion as on planes, host commands beside them, ranks,
+restarts, bad input."""
+import functools
+import sys
+import unittest
+from pathlib import Path
+
+import numpy as np
+
+sys.path.insert(0, str(Path(__file__).resolve().parent))
+import deck  # noqa: E402
+
+LAW = "kn 1e5 kt 5e4 cn 20 ct 5 mu 0.3"
+BOX = ((-0.2, 0.2), (-0.2, 0.2), (-0.05, 0.4))
+DUMPED = "id x y z vx vy vz omegax omegay omegaz"
+
+
+def stl(triangles):
+    lines = ["solid wall"]
+    for triangle in triangles:
+        a, b, c = (np.array(corner, dtype=float) for corner in triangle)
+        normal = np.cross(b - a, c - a)
+        normal /= np.linalg.norm(normal)
+        lines += ["facet normal {:.9g} {:.9g} {:.9g}".format(*normal), "outer loop"]
+        lines += ["vertex {:.17g} {:.17g} {:.17g}".format(*corner) for corner in (a, b, c)]
+        lines += ["endloop", "endfacet"]
+    return "\n".join(lines + ["endsolid wall"]) + "\n"
+
+
+def sheet(n, size, height=lambda x, y: 0.0, y_size=None):
+    """A square sheet of 2 n n triangles."""
+    xs, ys = np.linspace(-size, size, n + 1), np.linspace(-(y_size or size), y_size or size, n + 1)
+    at = lambda i, j: (xs[i], ys[j], height(xs[i], ys[j]))  # noqa: E731
+    triangles = []
+    for i in range(n):
+        for j in range(n):
+            a, b, c, d = at(i, j), at(i + 1, j), at(i + 1, j + 1), at(i, j + 1)
+            triangles += [(a, b, c), (a, c, d)] if (i + j) % 2 else [(a, b, d), (b, c, d)]
+    return triangles
+
+
+def tube(n, radius, length):
+    """Along y, about the origin; its corners on the circle that has the tube's cross section's area."""
+    radius = radius * np.sqrt(2 * np.pi / n / np.sin(2 * np.pi / n))
+    at = lambda k, y: (radius * np.cos(2 * np.pi * k / n), y, radius * np.sin(2 * np.pi * k / n))  # noqa: E731
+    triangles = []
+    for k in range(n):
+        triangles += [(at(k, -length), at(k + 1, -length), at(k + 1, length)),
+                      (at(k, -length), at(k + 1, length), at(k, length))]
+    return triangles
+
+
+def hills():
+    random = np.random.RandomState(1)
+    heights = {}
+    return sheet(10, 0.19, lambda x, y: heights.setdefault((x, y), random.uniform(-0.01, 0.01)))
+
+
+@functools.lru_cache(maxsize=None)
+def shape(kind, *sizes):
+    return deck.shape_file(kind, *sizes)
+
+
+PEBBLES = [(1, 1, 1, 0.03, 2500.0, 0.0, 0.0, 0.05, 0.8, 0.3, -0.5, 0.2),
+           (2, 1, 1, 0.03, 2500.0, 0.005, 0.01, 0.13, 1.0, 0.0, 0.0, 0.0)]
+THROWN = [(1, 0.1, 0.05, -0.3, 3.0, -2.0, 5.0), (2, 0.0, 0.0, -0.5, 0.0, 10.0, 0.0)]
+MESH = "fix m all mesh/surface file wall.stl type 1"
+
+
+def run(wall, atoms=PEBBLES, velocities=THROWN, mesh=None, body=None, before="", after="", steps="run 8000", ranks=1,
+        law=LAW, box=BOX, boundary="f f f", gravity="9.81 vector 0 0 -1", thermo="", start="", files=None, fails=False,
+        dt=1e-5):
+    """`before`: commands ahead of the wall."""
+    if body is None:
+        body = shape("ellipsoid", 1.2, 1, 0.8)
+    text = f"units si\n{{start}}neighbor 0.005 bin\nneigh_modify delay 0\nfix 1 all nve/nurbs\n"
+    text = text.format(start=start or f"atom_style nurbs body.json\nboundary {boundary}\nnewton off\n"
+                       f"communicate single vel yes\nread_data bodies.data\npair_style gran/nurbs\n"
+                       f"pair_coeff * * {LAW}\n")
+    if gravity:
+        text += f"fix g all gravity {gravity}\n"
+    text += f"""{before}
+fix w all wall/nurbs {wall} {law}
+compute ke all ke
+compute er all erotate/nurbs
+compute led all nurbs/energy
+compute st all nurbs/stats
+compute at all nurbs/atom mass
+variable mgz atom c_at*9.81*z
+compute mgz all reduce sum v_mgz
+variable ledger equal c_ke+c_er+c_mgz+c_led[1]+c_led[2]+c_led[3]+c_led[4]
+thermo_style custom step v_ledger f_w c_led[1] c_led[2] c_led[3] c_led[4] c_st[8] c_st[10] f_w[1] f_w[2] f_w[3] f_w[4] f_w[5] f_w[6] {thermo}
+thermo_modify format float %.15g norm no
+thermo 500
+timestep {dt}
+dump d all custom 500 out.dump {DUMPED}
+dump_modify d format "%d {' '.join(['%.17g'] * 9)}" sort id
+{after}
+{steps}
+"""
+    contents = {"body.json": body, "bodies.data": deck.data_file(atoms, velocities, box)}
+    if mesh is not None:
+        contents["wall.stl"] = stl(mesh)
+    contents.update(files or {})
+    return (deck.run if fails else deck.run_ok)(text, ranks=ranks, files=contents)
+
+
+def frames(result):
+    """Every frame's columns behind the id: (frame, particle, column)."""
+    return np.array([np.stack(list(columns.values())[1:], axis=-1) for _, columns in result.dump("out.dump")])
+
+
+def last(result):
+    return [list(column) for column in result.dump("out.dump")[-1][1].values()]
+
+
+class Meshes(unittest.TestCase):
+
+    def test_coplanar_triangles_are_a_plane(self):
+        plane = run("plane 0 0 0 0 0 1")
+        for n in (4, 9):
+            mesh = run("mesh m", mesh=sheet(n, 0.19), before=MESH)
+            np.testing.assert_allclose(frames(mesh), frames(plane), rtol=0, atol=2e-8)
+            self.assertEqual(mesh.thermo["st[10]"].max(), 0)
+            np.testing.assert_allclose(mesh.thermo["led[4]"], plane.thermo["led[4]"], rtol=1e-6, atol=1e-12)
+
+    def test_energy_closes_on_hills_and_the_cut_does_not_matter(self):
+        whole = run("mesh m", mesh=hills(), before=MESH)
+        dissipated = whole.thermo["led[3]"][-1] + whole.thermo["led[4]"][-1]
+        self.assertLess(np.ptp(whole.thermo["ledger"]), 1e-3 * dissipated)
+        fine = []
+        for a, b, c in hills():
+            middle = tuple((0.5 * np.array(a) + 0.3 * np.array(b) + 0.2 * np.array(c)).tolist())
+            fine += [(a, b, middle), (b, c, middle), (c, a, middle)]
+        cut = run("mesh m", mesh=fine, before=MESH)
+        np.testing.assert_allclose(frames(cut), frames(whole), rtol=0, atol=1e-6)
+
+    def test_two_meshes_are_one_wall(self):
+        floor = sheet(6, 0.18)
+        one = run("mesh m", mesh=floor, before=MESH)
+        two = run("mesh m n", before=MESH + "\nfix n all mesh/surface file other.stl type 1", mesh=floor[::2],
+                  files={"other.stl": stl(floor[1::2])})
+        np.testing.assert_allclose(frames(two), frames(one), rtol=0, atol=1e-9)
+
+    def test_boxes_stand_on_them(self):
+        box = [(1, 1, 1, 0.05, 2500.0, 0.0, 0.01, 0.0451, 1.0, 0.0, 0.0, 0.0)]
+        fall = [(1, 0, 0, -0.01, 0, 0, 0)]
+        plane = run("plane 0 0 0 0 0 1", box, fall, body=deck.box_shape(1, 0.8, 0.9))
+        mesh = run("mesh m", box, fall, mesh=sheet(8, 0.15), before=MESH, body=deck.box_shape(1, 0.8, 0.9))
+        np.testing.assert_allclose(frames(mesh), frames(plane), rtol=0, atol=1e-10)
+        self.assertEqual(mesh.thermo["st[8]"][-1], 4)
+        # Two thirds of it on a table: it stays. Its centre beyond the border: it falls.
+        table = sheet(1, 0.1)
+        for x, stays in ((0.08, True), (0.115, False)):
+            out = [(1, 1, 1, 0.05, 2500.0, x, 0.01, 0.0451, 1.0, 0.0, 0.0, 0.0)]
+            falls = run("mesh m", out, fall, mesh=table, before=MESH, body=deck.box_shape(1, 0.8, 0.9), steps="run 15000")
+            height = frames(falls)[-1, 0, 2]
+            if stays:
+                self.assertAlmostEqual(height, 0.045, delta=2e-4)
+            else:
+                self.assertLess(height, 0.04)
+
+    def test_force_and_torque_on_the_mesh(self):
+        ball = [(1, 1, 1, 0.03, 2500.0, 0.03, -0.02, 0.0299, 1.0, 0.0, 0.0, 0.0)]
+        at_rest = run("mesh m", ball, (), mesh=sheet(5, 0.15), body=shape("sphere", 1), steps="run 6000\nrun 50",
+                      before="fix m all mesh/surface/stress file wall.stl type 1", law="kn 1e5 kt 5e4 cn 200 ct 50 mu 0.3",
+                      thermo=" ".join(f"f_m[{k}]" for k in range(1, 7)), after="thermo 10")
+        weight = 2500 * 4 / 3 * np.pi * 0.03 ** 3 * 9.81
+        table = at_rest.tables[-1]
+        for k, value in enumerate((0, 0, -weight, 0.02 * weight, 0.03 * weight, 0), start=1):
+            np.testing.assert_allclose(table[f"m[{k}]"], value, rtol=0, atol=1e-6 * weight)  # step 0 of the second run too
+            np.testing.assert_allclose(table[f"w[{k}]"], value, rtol=0, atol=1e-6 * weight)
+
+    def test_periodic_borders(self):
+        slide = [(1, 1, 1, 0.03, 2500.0, 0.15, 0.0, 0.024, 1.0, 0.0, 0.0, 0.0)]
+        fast = [(1, 4.0, 1.0, 0, 0, 30.0, 0)]
+        options = dict(boundary="p p f", steps="run 16000", atoms=slide, velocities=fast)
+        plane = run("plane 0 0 0 0 0 1", **options)
+        for ranks in (1, 2):
+            mesh = run("mesh m", mesh=sheet(4, 0.2), before=MESH, ranks=ranks, **options)
+            np.testing.assert_allclose(frames(mesh), frames(plane), rtol=0, atol=1e-7)
+        self.assertGreater(plane.thermo["led[4]"][-1], 0.01)
+
+    def test_massflow_counts(self):
+        ball = [(1, 1, 1, 0.03, 2500.0, 0.0, 0.0, 0.2, 1.0, 0.0, 0.0, 0.0)]
+        door = sheet(2, 0.1, lambda x, y: 0.12)
+        counted = run("mesh m", ball, (), mesh=sheet(4, 0.19), files={"door.stl": stl(door)},
+                      before=MESH + "\nfix d all mesh/surface file door.stl type 1\n"
+                      "fix mf all massflow/mesh mesh d vec_side 0 0 -1 count once", thermo="f_mf[1] f_mf[2]",
+                      steps="run 20000")
+        self.assertEqual(counted.thermo["mf[2]"][-1], 1)
+        self.assertAlmostEqual(counted.thermo["mf[1]"][-1], 2500 * 4 / 3 * np.pi * 0.03 ** 3 * 0.8 * 1.2 * 1.0, delta=0.2)
+
+
+class MovingWalls(unittest.TestCase):
+    BALL = [(1, 1, 1, 0.03, 2500.0, 0.0, 0.0, 0.031, 0.9, 0.3, 0.1, 0.2)]
+
+    def test_what_counts_is_the_relative_motion(self):
+        drift = np.array([0.5, -0.3, 0.2])
+        still = frames(run("plane 0 0 0 0 0 1", self.BALL, [(1, 0.2, 0, -0.3, 0, 5, 0)], gravity=None, steps="run 6000"))
+        wall_moves = f"move linear {drift[0]} {drift[1]} {drift[2]}"
+        thrown = [(1, *(np.array([0.2, 0, -0.3]) + drift), 0, 5, 0)]
+        time = 500e-5 * np.arange(len(still))[:, None, None]
+        for wall, before, law in (("plane 0 0 0 0 0 1", "", f"{LAW} {wall_moves}"),
+                                  ("mesh m", MESH + f"\nfix mv all move/mesh mesh m {wall_moves[5:]}", LAW)):
+            moving = frames(run(wall, self.BALL, thrown, gravity=None, steps="run 6000", before=before, law=law,
+                                mesh=sheet(3, 0.15)))
+            moving[:, :, :3] -= time * drift
+            moving[:, :, 3:6] -= drift
+            np.testing.assert_allclose(moving[:, :, :6], still[:, :, :6], rtol=0, atol=3e-6)
+
+    def test_conveyor_drags(self):
+        box = [(1, 1, 1, 0.04, 2500.0, -0.1, 0.0, 0.0361, 1.0, 0.0, 0.0, 0.0)]
+        belt = "fix m all mesh/surface file wall.stl type 1 surface_vel 0.2 0.0 0.0"
+        carried = run("mesh m", box, (), mesh=sheet(5, 0.19), before=belt, body=deck.box_shape(1, 1, 0.9),
+                      steps="run 15000", law="kn 1e5 kt 5e4 cn 100 ct 50 mu 0.4")
+        velocity = frames(carried)[:, 0, 3:6]
+        np.testing.assert_allclose(velocity[-12:].mean(axis=0), [0.2, 0, 0], rtol=0, atol=4e-3)
+        # It slides first: mu g is its acceleration.
+        self.assertAlmostEqual(velocity[7, 0], 0.4 * 9.81 * 500e-5 * 7, delta=0.01)
+
+    def test_drum_of_triangles_and_round_drum(self):
+        ball = [(1, 1, 1, 0.03, 2500.0, 0.03, 0.0, -0.105, 0.9, 0.3, 0.1, 0.2)]
+        turn = "rotate origin 0 0 0 axis 0 1 0 period 0.5"
+        box = ((-0.2, 0.2), (-0.2, 0.2), (-0.2, 0.2))
+        law = "kn 1e5 kt 5e4 cn 100 ct 20 mu 0.5"
+        options = dict(box=box, steps="run 20000", law=law)
+        round_drum = run("cylinder y 0.14 0 0 move " + turn, ball, (), **options)
+        facets = run("mesh m", ball, (), mesh=tube(180, 0.14, 0.19), before=MESH + "\nfix mv all move/mesh mesh m " + turn,
+                     **options)
+        a, b = frames(round_drum)[:, 0, :3], frames(facets)[:, 0, :3]
+        self.assertGreater(np.abs(a[:, 0] - a[0, 0]).max(), 0.02)
+        np.testing.assert_allclose(b, a, rtol=0, atol=4e-3)
+        np.testing.assert_allclose(np.hypot(a[-1, 0], a[-1, 2]), 0.115, atol=0.01)
+
+    def test_wiggling_plane_throws(self):
+        # The plane rises with up to 0.63 / s; a ball that it meets so leaves it faster than it came.
+        shaken = run("plane 0 0 0 0 0 1", self.BALL, (), steps="run 30000",
+                     law=LAW + " move wiggle amplitude 0 0 0.002 period 0.02")
+        self.assertGreater(frames(shaken)[:, 0, 5].max(), 0.3)
+        self.assertGreater(frames(shaken)[:, 0, 2].min(), 0.02)
+
+    def test_restart_in_motion(self):
+        motion = LAW + " move rotate origin 0 0 0 axis 0 1 0 period 4"
+        one = run("plane 0 0 0 0 0 1", self.BALL, (), law=motion, steps="run 6000")
+        half = run("plane 0 0 0 0 0 1", self.BALL, (), law=motion, steps="run 2500\nwrite_restart half.rst")
+        other = run("plane 0 0 0 0 0 1", law=motion, steps="run 3500", ranks=2, files={"half.rst": half.path / "half.rst"},
+                    start="newton off\ncommunicate single vel yes\nread_restart half.rst\n")
+        np.testing.assert_allclose(last(other), last(one), rtol=0, atol=1e-9)
+
+
+class Cylinders(unittest.TestCase):
+
+    def test_ball_inside_and_outside(self):
+        # At rest on the wall the overlap is the force over kn; the centre moves on a circle about the axis.
+        for radius, x, sign in ((0.1, 0.07 + 1e-4, -1), (0.05, 0.08 - 1e-4, 1)):
+            ball = [(1, 1, 1, 0.03, 2500.0, x, 0.0, 0.1, 1.0, 0.0, 0.0, 0.0)]
+            out = run(f"cylinder y {radius} 0 0.1", ball, (), body=shape("sphere", 1), gravity=None, steps="run 0",
+                      law="kn 1e5 kt 0 mu 0")
+            self.assertAlmostEqual(out.thermo["w[1]"][0], -sign * 1e5 * 1e-4, delta=1e-6)
+            np.testing.assert_allclose(out.thermo["w[3]"][0], 0, atol=1e-6)
+            self.assertAlmostEqual(out.thermo["w"][0], 0.5e5 * 1e-8, delta=1e-10)
+
+    def test_oblong_body_across_a_tube_leans_on_both_sides(self):
+        body = [(1, 1, 1, 0.05, 2500.0, 0.0, 0.0, 0.1, 1.0, 0.0, 0.0, 0.0)]
+        out = run("cylinder y 0.0999 0 0.1", body, (), body=shape("ellipsoid", 2, 1, 0.8), gravity=None, steps="run 0")
+        self.assertEqual(out.thermo["st[8]"][0], 2)
+        np.testing.assert_allclose(out.thermo["w"][0], 2 * 0.5e5 * 1e-8, rtol=1e-6)
+
+    def test_energy_closes(self):
+        ball = [(1, 1, 1, 0.03, 2500.0, 0.03, 0.0, 0.1, 0.9, 0.3, 0.1, 0.2)]
+        out = run("cylinder y 0.1 0 0.12", ball, [(1, 0, 0.3, 0, 5, 0, 3)], law="kn 1e5 kt 5e4 mu 0.3", steps="run 15000")
+        self.assertLess(np.ptp(out.thermo["ledger"]), 1e-4 * out.thermo["ledger"][0])
+
+
+class RanksAndRestarts(unittest.TestCase):
+    OPTIONS = dict(mesh=hills(), before=MESH)
+
+    @staticmethod
+    @functools.lru_cache(maxsize=None)
+    def reference():
+        return run("mesh m", steps="run 9000", **RanksAndRestarts.OPTIONS)
+
+    def assert_same(self, other):
+        self.assertEqual(last(other), last(self.reference()))
+
+    def test_the_same_bits_on_two_and_four_ranks(self):
+        for ranks in (2, 4):
+            self.assert_same(run("mesh m", steps="run 9000", ranks=ranks, **self.OPTIONS))
+
+    def test_the_same_bits_in_two_parts_and_across_a_restart(self):
+        self.assert_same(run("mesh m", steps="run 4321\nrun 4679", **self.OPTIONS))
+        half = run("mesh m", steps="run 4321\nwrite_restart half.rst", ranks=2, **self.OPTIONS)
+        self.assert_same(run("mesh m", steps="run 4679", ranks=4, files={"half.rst": half.path / "half.rst"},
+                             start="newton off\ncommunicate single vel yes\nread_restart half.rst\n", **self.OPTIONS))
+
+
+class BadInput(unittest.TestCase):
+
+    def assert_error(self, words, wall, **options):
+        result = run(wall, steps="run 0", fails=True, **options)
+        self.assertNotEqual(result.status, 0)
+        self.assertTrue(any(words in line for line in result.errors), result.screen[-500:])
+
+    def test_one_line_names_what_is_wrong(self):
+        floor = dict(mesh=sheet(2, 0.1), before=MESH)
+        self.assert_error("needs the ID of a fix mesh/surface", "mesh")
+        self.assert_error("there is no fix nope", "mesh nope", **floor)
+        self.assert_error("fix g is a gravity", "mesh g", **floor)
+        self.assert_error("fix m is there twice", "mesh m m", **floor)
+        self.assert_error("meshes have fix move/mesh", "mesh m", law=LAW + " move linear 1 0 0", **floor)
+        self.assert_error("must be plane, cylinder or mesh", "ball 1 2 3")
+        self.assert_error("axis q must be x, y or z", "cylinder q 1 0 0")
+        self.assert_error("radius = -1", "cylinder z -1 0 0")
+        self.assert_error("move spin must be linear, rotate or wiggle", "plane 0 0 0 0 0 1", law=LAW + " move spin 1")
+        self.assert_error("period = 0", "plane 0 0 0 0 0 1", law=LAW + " move wiggle amplitude 0 0 1 period 0")
+        self.assert_error("needs neighbor SKIN bin", "mesh m", after="neighbor 0.005 nsq", **floor)
+
+
+if __name__ == "__main__":
+    unittest.main()
