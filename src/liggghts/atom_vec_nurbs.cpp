@@ -12,11 +12,10 @@
 #include "comm.h"
 #include "domain.h"
 #include "error.h"
-#include "fix_insert.h"
-#include "fix_particledistribution_discrete.h"
+#include "fix.h"
 #include "lammps.h"
-#include "liggghts/fix_template_nurbs.h"
 #include "liggghts/host_error.h"
+#include "liggghts/host_rules.h"
 #include "memory.h"
 #include "modify.h"
 #include "neighbor.h"
@@ -254,29 +253,11 @@ void AtomVecNurbs::settings(int narg, char** arg) {
 
 void AtomVecNurbs::init() {
   AtomVec::init();
-  if (domain->dimension != 3) nurbs_host::fail_all(FLERR, lmp, "atom_style nurbs needs a 3d simulation");
-  if (domain->is_wedge) nurbs_host::fail_all(FLERR, lmp, "atom_style nurbs cannot be used in a wedge domain");
   if (shapes_.count() == 0) nurbs_host::fail_all(FLERR, lmp, "atom_style nurbs has no shapes");
-  refuse_spheres_to_insert();
-  for (int i = 0; i < atom->nlocal; ++i) follow_set_command(i);
+  nurbs_host::check_host(lmp, &told_);
+  follow_set_commands();
   if (const std::string bad = check_all_owned(); !bad.empty()) nurbs_host::fail_one(lmp, bad);
-}
-
-// The host inserts when a run begins, after init.
-void AtomVecNurbs::refuse_spheres_to_insert() {
-  for (int k = 0; k < modify->nfix; ++k) {
-    auto* insert = dynamic_cast<FixInsert*>(modify->fix[k]);
-    if (insert == nullptr) continue;
-    FixParticledistributionDiscrete* distribution = insert->get_distribution();
-    for (int n = 0; n < distribution->n_particletemplates(); ++n) {
-      const Fix* model = distribution->particletemplates()[n];
-      if (dynamic_cast<const FixTemplateNurbs*>(model) == nullptr)
-        nurbs_host::fail_all(FLERR, lmp,
-                             std::string("Fix ") + insert->style + " " + insert->id + ": its template " +
-                                 model->id + " is of " + model->style +
-                                 "; atom_style nurbs needs fix particletemplate/nurbs");
-    }
-  }
+  warn_default_density();
 }
 
 // In the course of a step the host has its ghosts, of one step before, but drops them after an insertion; the
@@ -336,6 +317,27 @@ std::vector<nurbs::Particle> AtomVecNurbs::foreign_bodies(double radius) const {
     }
   }
   return found;
+}
+
+void AtomVecNurbs::turn(int i, const Quat& by) {
+  put_quaternion(i, (by * to_quat(quaternion_[i])).normalized());
+}
+
+void AtomVecNurbs::follow_set_commands() {
+  for (int i = 0; i < atom->nlocal; ++i) follow_set_command(i);
+}
+
+// Once: create_atoms has no word for it, and a forgotten `set density` leaves bodies of 1 kg/m3.
+void AtomVecNurbs::warn_default_density() {
+  int mine = 0, all = 0;
+  for (int i = 0; i < atom->nlocal; ++i) mine += density_[i] == 1;
+  MPI_Allreduce(&mine, &all, 1, MPI_INT, MPI_SUM, world);
+  if (density_wanted_ && all > 0)
+    nurbs_host::warn(FLERR, lmp,
+                     std::to_string(all) +
+                         " particles made by create_atoms have density 1; say so by 'set group all density "
+                         "1' or give theirs");
+  density_wanted_ = false;
 }
 
 // The host's `set` command treats a particle as a sphere. `set diameter` (of the bounding sphere) means a

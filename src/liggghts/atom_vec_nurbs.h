@@ -10,6 +10,7 @@ AtomStyle(nurbs,AtomVecNurbs)
 #ifndef LMP_ATOM_VEC_NURBS_H
 #define LMP_ATOM_VEC_NURBS_H
 
+#include <set>
 #include <string>
 #include <vector>
 
@@ -68,6 +69,16 @@ class AtomVecNurbs : public AtomVec {
   // Makes particle i a body of this shape, scale, density and orientation (normalised), and sets what follows
   // from them: mass and bounding radius. The values must be valid.
   void set_body(int i, int shape_number, double scale, double density, const nurbs::Quat& orientation);
+
+  // Turns particle i, whose omega stays.
+  void turn(int i, const nurbs::Quat& by);
+
+  // After the host has changed radii, densities or masses as those of spheres: what these mean here.
+  void follow_set_commands();
+
+  // create_atoms has made particles without saying what of; `set density` has said it.
+  void density_wanted() { density_wanted_ = true; }
+  void density_given() { density_wanted_ = false; }
 
   // A fix insert/* begins: the bodies that are there now, ghosts too, are what insertion_site() holds, until
   // the next begins. `radius`: the largest that will be inserted. Collective.
@@ -149,7 +160,7 @@ class AtomVecNurbs : public AtomVec {
   double* get_border(int n, int first, bool velocity, double* p);
 
   int append_atom(int type, const double* coord, tagint image);
-  void refuse_spheres_to_insert();
+  void warn_default_density();
   std::vector<nurbs::Particle> foreign_bodies(double radius) const;
   void follow_set_command(int i);
   void update_size(int i);
@@ -172,7 +183,9 @@ class AtomVecNurbs : public AtomVec {
   double* scale_ = nullptr;
   std::vector<SpinRecord> spin_;
 
-  nurbs::RotorBatch batch_;  // scratch
+  bool density_wanted_ = false;
+  std::set<std::string> told_;  // warnings of host_rules.h
+  nurbs::RotorBatch batch_;     // scratch
 };
 
 inline bool AtomVecNurbs::spin_is_kept(int i) const {

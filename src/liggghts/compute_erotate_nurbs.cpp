@@ -11,6 +11,24 @@
 
 namespace LAMMPS_NS {
 
+namespace {
+
+// Of the group's particles on all ranks. Collective.
+double rotational_energy(const LAMMPS& lmp, int groupbit) {
+  const Atom& atom = *lmp.atom;
+  const auto& bodies = static_cast<const AtomVecNurbs&>(*atom.avec);
+  double mine = 0, all = 0;
+  for (int i = 0; i < atom.nlocal; ++i) {
+    if (!(atom.mask[i] & groupbit)) continue;
+    mine += 0.5 * nurbs::Vec3::Map(atom.omega[i]).dot(bodies.angular_momentum(i));
+  }
+  mine *= lmp.force->mvv2e;
+  MPI_Allreduce(&mine, &all, 1, MPI_DOUBLE, MPI_SUM, lmp.world);
+  return all;
+}
+
+}  // namespace
+
 ComputeERotateNurbs::ComputeERotateNurbs(LAMMPS* lmp, int& iarg, int narg, char** arg)
     : Compute(lmp, iarg, narg, arg) {
   if (narg != iarg) nurbs_host::fail_all(FLERR, lmp, "Compute erotate/nurbs takes no arguments");
@@ -25,15 +43,13 @@ void ComputeERotateNurbs::init() {
 
 double ComputeERotateNurbs::compute_scalar() {
   invoked_scalar = update->ntimestep;
-  const auto& bodies = static_cast<const AtomVecNurbs&>(*atom->avec);
-  double energy = 0;
-  for (int i = 0; i < atom->nlocal; ++i) {
-    if (!(atom->mask[i] & groupbit)) continue;
-    energy += 0.5 * nurbs::Vec3::Map(atom->omega[i]).dot(bodies.angular_momentum(i));
-  }
-  energy *= force->mvv2e;
-  MPI_Allreduce(&energy, &scalar, 1, MPI_DOUBLE, MPI_SUM, world);
-  return scalar;
+  return scalar = rotational_energy(*lmp, groupbit);
+}
+
+double ComputeERotateAny::compute_scalar() {
+  if (dynamic_cast<AtomVecNurbs*>(atom->avec) == nullptr) return ComputeERotate::compute_scalar();
+  invoked_scalar = update->ntimestep;
+  return scalar = rotational_energy(*lmp, groupbit);
 }
 
 }  // namespace LAMMPS_NS

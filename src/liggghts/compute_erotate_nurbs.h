@@ -2,7 +2,7 @@
 //   compute ID group erotate/nurbs
 #ifdef COMPUTE_CLASS
 
-ComputeStyle(erotate/nurbs,ComputeERotateNurbs)
+ComputeStyle(erotate/nurbs,ComputeERotateNurbs) ComputeStyle(erotate,ComputeERotateAny)
 
 #else
 
@@ -10,6 +10,7 @@ ComputeStyle(erotate/nurbs,ComputeERotateNurbs)
 #define LMP_COMPUTE_EROTATE_NURBS_H
 
 #include "compute.h"
+#include "compute_erotate.h"
 
 namespace LAMMPS_NS {
 
@@ -18,6 +19,13 @@ class ComputeERotateNurbs : public Compute {
   ComputeERotateNurbs(LAMMPS* lmp, int& iarg, int narg, char** arg);
 
   void init() override;
+  double compute_scalar() override;
+};
+
+// compute erotate, which is thermo's keyword erotate: the host's, which knows spheres and would say 0 here.
+class ComputeERotateAny : public ComputeERotate {
+ public:
+  ComputeERotateAny(LAMMPS* lmp, int& iarg, int narg, char** arg) : ComputeERotate(lmp, iarg, narg, arg) {}
   double compute_scalar() override;
 };
 

@@ -191,7 +191,8 @@ FixTemplateNurbs::FixTemplateNurbs(LAMMPS* lmp, int narg, char** arg)
 
 FixTemplateNurbs::FixTemplateNurbs(LAMMPS* lmp, int narg, char** arg, std::vector<char*> host)
     : FixTemplateSphere(lmp, static_cast<int>(host.size()), host.data()),
-      bodies_(AtomVecNurbs::require(lmp, kUser)) {
+      bodies_(AtomVecNurbs::require(lmp, kUser)),
+      seed_(seed_mc) {
   if (force->cg_active()) fail_all(FLERR, lmp, std::string(kUser) + " can't be used with coarsegraining");
   parse(narg, arg);
   volume_expect = shape().mass.volume * expected_cube();
@@ -252,12 +253,12 @@ void FixTemplateNurbs::parse_scale(const char* kind, char** values) {
     fail_all(FLERR, lmp, what + " " + values[0] + " " + values[1] + ": MU - 3 SIGMA must be > 0");
 }
 
-double FixTemplateNurbs::draw_scale() {
+double FixTemplateNurbs::draw_scale(RanPark& random) const {
   const double middle = (model_.low + model_.high) / 2, half = (model_.high - model_.low) / 2;
   if (model_.spread == Spread::constant) return model_.low;
-  if (model_.spread == Spread::uniform) return model_.low + 2 * half * random_insertion->uniform();
+  if (model_.spread == Spread::uniform) return model_.low + 2 * half * random.uniform();
   double x;
-  do x = random_insertion->gaussian();
+  do x = random.gaussian();
   while (std::abs(x) > kSigmas);
   return middle + half / kSigmas * x;
 }
@@ -285,7 +286,17 @@ double FixTemplateNurbs::max_rad() {
 void FixTemplateNurbs::fill(ParticleToInsert* particle) {
   particle->atom_type = atom_type;
   static_cast<ParticleToInsertNurbs*>(particle)->set_body(
-      draw_scale(), LMP_PROBABILITY_NS::rand(pdf_density, random_insertion));
+      draw_scale(*random_insertion), LMP_PROBABILITY_NS::rand(pdf_density, random_insertion));
+}
+
+// By random numbers that belong to its place.
+void FixTemplateNurbs::make(int i) {
+  RanPark random(lmp, "15485863");
+  random.reset(seed_, atom->x[i]);
+  const double scale = draw_scale(random);
+  const double density = LMP_PROBABILITY_NS::rand(pdf_density, &random);
+  bodies_->set_body(i, model_.shape, scale, density,
+                    model_.random ? random_orientation(random) : model_.orientation);
 }
 
 void FixTemplateNurbs::randomize_single() {

@@ -67,6 +67,9 @@ class FixTemplateNurbs : public FixTemplateSphere {
   FixTemplateNurbs(LAMMPS* lmp, int narg, char** arg);
   ~FixTemplateNurbs() override;
 
+  // Makes particle i, which is there, one that this template draws; the same on any rank. Its type stays.
+  void make(int i);
+
   double min_rad() override;
   double max_rad() override;
   double max_r_bound() override { return max_rad(); }
@@ -83,12 +86,13 @@ class FixTemplateNurbs : public FixTemplateSphere {
   const nurbs::Shape& shape() const;
   void parse(int narg, char** arg);
   void parse_scale(const char* kind, char** values);
-  double draw_scale();
+  double draw_scale(RanPark& random) const;
   double expected_cube() const;
   void fill(ParticleToInsert* particle);
 
   AtomVecNurbs* bodies_;
   NurbsTemplate model_;
+  int seed_;  // as given
 };
 
 }  // namespace LAMMPS_NS

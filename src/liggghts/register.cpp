@@ -2,8 +2,8 @@
 // own calls go through the dynamic symbol table: a definition of Atom::new_avec or Output::add_dump that
 // comes earlier in symbol lookup (this executable, or libliggghts_nurbs.so under LD_PRELOAD) is the one that
 // runs. Both definitions here serve the NURBS styles and hand everything else to the host's own function
-// (dlsym RTLD_NEXT). The pair, fix and compute styles are put into the host's creator maps when `atom_style
-// nurbs` is created, in an input script or by a restart.
+// (dlsym RTLD_NEXT). The pair, fix, compute and command styles are put into the host's creator maps when
+// `atom_style nurbs` is created, in an input script or by a restart.
 //
 // Not used in a LIGGGHTS source tree (`make -f Makefile.package install`): there the host's make finds the
 // styles by the macros in their headers. To add a style, include its header in styles.h; nothing else.
@@ -23,6 +23,7 @@
 #include "fix.h"
 #include "force.h"
 #include "group.h"
+#include "input.h"
 #include "lammps.h"
 #include "memory.h"
 #include "modify.h"
@@ -57,6 +58,16 @@ struct AccessKey {
 };
 template struct AccessKey<&Modify::compute_map, &Modify::fix_map>;
 
+// The same for Input::command_map.
+using LAMMPS_NS::Input;
+using CommandMap = std::map<std::string, void (*)(LAMMPS*, int, char**)>;
+CommandMap* Input::*command_map_member(int);
+template <CommandMap* Input::*commands>
+struct InputAccessKey {
+  friend CommandMap* Input::*command_map_member(int) { return commands; }
+};
+template struct InputAccessKey<&Input::command_map>;
+
 template <class Style>
 [[maybe_unused]] Pair* create_pair(LAMMPS* lmp) {
   return new Style(lmp);
@@ -65,6 +76,11 @@ template <class Style>
 template <class Style>
 [[maybe_unused]] Fix* create_fix(LAMMPS* lmp, int narg, char** arg) {
   return new Style(lmp, narg, arg);
+}
+
+template <class Style>
+[[maybe_unused]] void do_command(LAMMPS* lmp, int narg, char** arg) {
+  Style(lmp).command(narg, arg);
 }
 
 template <class Style>
@@ -92,6 +108,12 @@ void register_styles(LAMMPS* lmp) {
 #include "liggghts/styles.h"
 #undef ComputeStyle
 #undef COMPUTE_CLASS
+  [[maybe_unused]] CommandMap& commands = *(lmp->input->*command_map_member(0));
+#define COMMAND_CLASS
+#define CommandStyle(key, Class) commands[#key] = &do_command<LAMMPS_NS::Class>;
+#include "liggghts/styles.h"
+#undef CommandStyle
+#undef COMMAND_CLASS
 }
 
 // The host's own definition of a function this file also defines.

@@ -258,7 +258,9 @@ class Where(Decks):
                  "vel constant 0 0 -3 omega constant 1 2 3 insertion_face face extrude_length 2\n")
         text += OUTPUT.replace("custom 1 ", "custom 500 ") + "timestep 1e-3\nrun 1000\n"
         for ranks in (1, 2):
-            frames = self.run_deck(text, ranks=ranks, more={"face.stl": face}).dump("dump.txt")[1:]
+            run = self.run_deck(text, ranks=ranks, more={"face.stl": face})
+            self.assertNotIn("is no wall", run.screen)
+            frames = run.dump("dump.txt")[1:]
             first, last = (frame for _, frame in frames)
             self.assertEqual(len(first["x"]), 40)
             self.assertGreater(least_separation(first)[0], 0.999)

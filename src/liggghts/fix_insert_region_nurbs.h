@@ -7,8 +7,8 @@ FixStyle(insert/pack,FixInsertPackNurbs) FixStyle(insert/rate/region,FixInsertRa
 
 #else
 
-#ifndef LMP_FIX_INSERT_PACK_NURBS_H
-#define LMP_FIX_INSERT_PACK_NURBS_H
+#ifndef LMP_FIX_INSERT_REGION_NURBS_H
+#define LMP_FIX_INSERT_REGION_NURBS_H
 
 #include "fix_insert_pack.h"
 #include "fix_insert_rate_region.h"

@@ -1,5 +1,5 @@
-// See fix_insert_pack_nurbs.h.
-#include "liggghts/fix_insert_pack_nurbs.h"
+// See fix_insert_region_nurbs.h.
+#include "liggghts/fix_insert_region_nurbs.h"
 
 #include <cmath>
 #include <string>

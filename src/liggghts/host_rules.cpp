@@ -1,0 +1,181 @@
+// See host_rules.h.
+#include "liggghts/host_rules.h"
+
+#include <cstring>
+#include <string>
+
+#include "atom.h"
+#include "comm.h"
+#include "domain.h"
+#include "fix.h"
+#include "fix_insert.h"
+#include "fix_mesh_surface.h"
+#include "fix_particledistribution_discrete.h"
+#include "force.h"
+#include "lammps.h"
+#include "liggghts/fix_template_nurbs.h"
+#include "liggghts/host_error.h"
+#include "liggghts/pair_gran_nurbs.h"
+#include "modify.h"
+#include "neighbor.h"
+#include "update.h"
+
+namespace LAMMPS_NS::nurbs_host {
+
+namespace {
+
+constexpr int kMulti = 2;     // of Neighbor::style, whose names are local to the host's files
+constexpr int kMinimize = 2;  // of Update::whichflag
+
+struct Rule {
+  const char* prefix;  // of a fix style
+  const char* instead;
+};
+
+// Take the particles for spheres, or know no torque.
+constexpr Rule kRefused[] = {{"wall/gran", "; use fix wall/nurbs"},
+                             {"wall/region", "; use fix wall/nurbs"},
+                             {"wall/sph", "; use fix wall/nurbs"},
+                             {"rigid", "; use fix nve/nurbs"},
+                             {"multisphere", "; use fix nve/nurbs"},
+                             {"concave", "; use fix nve/nurbs"},
+                             {"multicontact", ""},
+                             {"heat/gran", ""},
+                             {"sph/", ""},
+                             {"insert/stream/predefined", "; use fix insert/stream"}};
+
+// Go on with the volume or cross-section of the bounding sphere.
+constexpr Rule kSpherical[] = {{"couple/cfd", "drag and volume"},
+                               {"buoyancy", "volume"},
+                               {"ave/euler", "volume"},
+                               {"continuum/weighted", "volume"},
+                               {"transportequation", "size"}};
+
+bool starts_with(const char* text, const char* prefix) {
+  return std::strncmp(text, prefix, std::strlen(prefix)) == 0;
+}
+
+void warn_once(LAMMPS* lmp, std::set<std::string>* told, const std::string& message) {
+  if (told->insert(message).second) warn(FLERR, lmp, message);
+}
+
+void check_settings(LAMMPS* lmp) {
+  const auto refuse = [&](const std::string& what) { fail_all(FLERR, lmp, "atom_style nurbs " + what); };
+  if (lmp->domain->dimension != 3) refuse("needs a 3d simulation");
+  if (lmp->domain->is_wedge) refuse("cannot be used in a wedge domain");
+  if (lmp->domain->triclinic)
+    refuse(
+        "cannot be used in a triclinic box, in which LIGGGHTS loses granular particles; use an orthogonal "
+        "one");
+  if (lmp->neighbor->style == kMulti)
+    refuse("cannot be used with 'neighbor .. multi', which finds no contacts; use bin");
+  if (starts_with(lmp->update->integrate_style, "respa"))
+    refuse("cannot be used with 'run_style respa'; use verlet");
+  if (lmp->update->whichflag == kMinimize)
+    refuse("cannot be used with minimize: no orientation would be turned");
+  if (lmp->force->cg_active()) refuse("cannot be used with coarsegraining");
+}
+
+// A restart file doesn't hold it.
+void warn_default_step(LAMMPS* lmp, std::set<std::string>* told) {
+  if (lmp->update->timestep_set) return;
+  warn_once(lmp, told,
+            "There is no 'timestep' in the input script; LIGGGHTS's default of " + show(lmp->update->dt) +
+                " is used");
+}
+
+// The pair style's own init has had its say by now.
+void check_pair_style(LAMMPS* lmp, std::set<std::string>* told) {
+  if (lmp->force->pair != nullptr && PairGranNurbs::find(lmp) == nullptr)
+    fail_all(FLERR, lmp,
+             std::string("atom_style nurbs needs pair_style gran/nurbs; pair_style ") +
+                 lmp->force->pair_style + " takes the particles for spheres");
+  if (lmp->force->pair != nullptr) return;
+  const std::string missing = "atom_style nurbs: there is no pair_style gran/nurbs";
+  if (lmp->atom->sortfreq > 0 &&
+      !(lmp->comm->cutghostuser > 0))  // would end in 'Atom sorting has bin size = 0.0'
+    fail_all(FLERR, lmp, missing + "; for particles without contacts, say 'atom_modify sort 0 0'");
+  if (lmp->atom->natoms > 1) warn_once(lmp, told, missing + ": particles go through each other");
+}
+
+void check_integrator(LAMMPS* lmp, const Fix& fix) {
+  if (!fix.time_integrate || std::strcmp(fix.style, "nve/nurbs") == 0 || std::strcmp(fix.style, "move") == 0)
+    return;
+  fail_all(FLERR, lmp,
+           std::string("Fix ") + fix.style + " " + fix.id +
+               " would move NURBS particles without turning them; use fix nve/nurbs");
+}
+
+// The host inserts when a run begins, after this.
+void check_insertion(LAMMPS* lmp, Fix* fix) {
+  auto* insert = dynamic_cast<FixInsert*>(fix);
+  if (insert == nullptr) return;
+  FixParticledistributionDiscrete* distribution = insert->get_distribution();
+  for (int n = 0; n < distribution->n_particletemplates(); ++n) {
+    const Fix* model = distribution->particletemplates()[n];
+    if (dynamic_cast<const FixTemplateNurbs*>(model) == nullptr)
+      fail_all(FLERR, lmp,
+               std::string("Fix ") + fix->style + " " + fix->id + ": its template " + model->id + " is of " +
+                   model->style + "; atom_style nurbs needs fix particletemplate/nurbs");
+  }
+}
+
+// A mesh that is neither a wall nor a face that particles are inserted or counted at. What uses one for
+// contact or counting has the host make it a fix neighlist/mesh, named neighlist_USER_MESH.
+void warn_idle_mesh(LAMMPS* lmp, Fix* fix, std::set<std::string>* told) {
+  auto* mesh = dynamic_cast<FixMeshSurface*>(fix);
+  if (mesh == nullptr || mesh->triMesh()->isInsertionMesh()) return;
+  const std::string ending = std::string("_") + fix->id;
+  for (int k = 0; k < lmp->modify->nfix; ++k) {
+    const std::string id = lmp->modify->fix[k]->id;
+    if (starts_with(lmp->modify->fix[k]->style, "neighlist/mesh") && id.size() > ending.size() &&
+        id.compare(id.size() - ending.size(), ending.size(), ending) == 0)
+      return;
+  }
+  warn_once(lmp, told,
+            std::string("Fix ") + fix->style + " " + fix->id +
+                " is no wall to the particles: they go through it; name it in fix wall/nurbs mesh");
+}
+
+void check_fix(LAMMPS* lmp, Fix* fix, std::set<std::string>* told) {
+  for (const Rule& rule : kRefused)
+    if (starts_with(fix->style, rule.prefix))
+      fail_all(FLERR, lmp,
+               std::string("Fix ") + fix->style + " can't be used with atom_style nurbs" + rule.instead);
+  for (const Rule& rule : kSpherical)
+    if (starts_with(fix->style, rule.prefix))
+      warn_once(lmp, told,
+                std::string("Fix ") + fix->style + " " + fix->id + " goes on with the " + rule.instead +
+                    " of the particles' bounding spheres");
+  if (fix->rad_mass_vary_flag)
+    fail_all(FLERR, lmp,
+             std::string("Fix ") + fix->style + " " + fix->id +
+                 " changes diameters as those of spheres; use 'set group .. nurbs/scale S' between runs");
+  warn_idle_mesh(lmp, fix, told);
+  check_integrator(lmp, *fix);
+  check_insertion(lmp, fix);
+}
+
+// Walls of a restart file that the input script doesn't name again.
+void warn_lost_walls(LAMMPS* lmp, std::set<std::string>* told) {
+  for (int k = 0;; ++k) {
+    char* id = lmp->modify->id_restart_data_global_style("wall/nurbs", k);
+    if (id == nullptr) return;
+    if (lmp->modify->find_fix(id) < 0)
+      warn_once(lmp, told,
+                std::string("The restart file holds contacts of fix wall/nurbs ") + id +
+                    ", which there is no longer: a wall of another ID starts without them");
+  }
+}
+
+}  // namespace
+
+void check_host(LAMMPS* lmp, std::set<std::string>* told) {
+  check_settings(lmp);
+  warn_default_step(lmp, told);
+  check_pair_style(lmp, told);
+  for (int k = 0; k < lmp->modify->nfix; ++k) check_fix(lmp, lmp->modify->fix[k], told);
+  warn_lost_walls(lmp, told);
+}
+
+}  // namespace LAMMPS_NS::nurbs_host

@@ -1,0 +1,15 @@
+// Settings and styles of the host under which NURBS particles would move wrongly without a word.
+#pragma once
+
+#include <set>
+#include <string>
+
+#include "pointers.h"
+
+namespace LAMMPS_NS::nurbs_host {
+
+// Refuses, with one line that says what to use instead, or warns of them, of each once: `told` remembers the
+// warnings. When a run begins, after the pair style's init. Collective.
+void check_host(LAMMPS* lmp, std::set<std::string>* told);
+
+}  // namespace LAMMPS_NS::nurbs_host

@@ -1,0 +1,251 @@
+#!/usr/bin/python3
+"""What the host offers beside the NURBS styles: set and other commands that act on bodies, and what is refused or warned of."""
+import pathlib
+import sys
+import unittest
+
+import numpy as np
+
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent))
+import deck
+
+AXES = np.array([0.3, 0.4, 0.5])  # half edges of the box
+SHAPES = {"box.json": deck.box_shape(*AXES), "cube.json": deck.box_shape(0.5, 0.5, 0.5)}
+ATOMS = [(1, 1, 1, 1.0, 1000.0, -1.0, 0.0, 2.0, 1.0, 0.0, 0.0, 0.0), (2, 1, 2, 0.5, 2000.0, 1.0, 0.0, 2.0, 1.0, 0.0, 0.0, 0.0),
+         (3, 2, 1, 0.8, 2000.0, 1.0, 0.2, 4.0, 1.0, 0.3, 0.0, 0.0)]
+COEFFICIENTS = "kn 1e6 kt 5e5 cn 1e3 mu 0.4"
+DECK = """
+units si
+newton off
+communicate single vel yes
+atom_style nurbs box.json cube.json
+atom_modify map array
+boundary p p f
+read_data in.data
+neighbor 0.3 bin
+neigh_modify delay 0
+pair_style gran/nurbs
+pair_coeff * * COEFFICIENTS
+fix floor all wall/nurbs plane 0 0 0 0 0 1 COEFFICIENTS
+fix gravity all gravity 9.81 vector 0 0 -1
+fix motion all nve/nurbs
+compute b all nurbs/atom qw qx qy qz shape scale
+timestep 1e-4
+""".replace("COEFFICIENTS", COEFFICIENTS)
+DUMP = """
+dump d all custom 1000000 dump.txt id x y z vx vy vz omegax omegay omegaz radius density mass c_b[1] c_b[2] c_b[3] c_b[4] &
+  c_b[5] c_b[6]
+dump_modify d first yes format "%d FORMAT"
+run 0
+""".replace("FORMAT", "%.17g " * 18)
+
+
+def files(velocities=None):
+    at_rest = [(atom[0], 0.0, 0.0, 0.0, 0.0, 0.0, 0.0) for atom in ATOMS]
+    return {**SHAPES, "in.data": deck.data_file(ATOMS, velocities or at_rest, types=2, box=((-6, 6), (-6, 6), (0, 12)))}
+
+
+def after(commands, ranks=1, text=DECK):
+    """The particles after these commands."""
+    return deck.run_ok(text + commands + DUMP, ranks=ranks, files=files()).dump("dump.txt")[-1][1]
+
+
+def quaternions(frame):
+    return np.stack([frame[f"c_b[{k}]"] for k in (1, 2, 3, 4)], axis=1)
+
+
+class Set(unittest.TestCase):
+    def check_sizes(self, frame):
+        box = frame["c_b[5]"] == 1
+        volume = np.where(box, 8 * AXES.prod(), 1.0) * frame["c_b[6]"] ** 3
+        np.testing.assert_allclose(frame["mass"], frame["density"] * volume, rtol=1e-13)
+        radius = np.where(box, np.linalg.norm(AXES), np.sqrt(0.75)) * frame["c_b[6]"]
+        np.testing.assert_allclose(frame["radius"], radius, rtol=1e-6)
+
+    def test_shape_scale_density_and_orientation(self):
+        frame = after("set group all nurbs/shape cube nurbs/scale 0.7 density 500\nset atom 2*3 quat 0 0 2 90\n"
+                      "set type 2 vx 3 density 700 vy 2 nurbs/shape box\n")
+        np.testing.assert_array_equal(frame["c_b[5]"], [2, 2, 1])
+        np.testing.assert_array_equal(frame["c_b[6]"], 0.7)
+        np.testing.assert_array_equal(frame["density"], [500, 500, 700])
+        half = np.sqrt(0.5)
+        np.testing.assert_allclose(quaternions(frame), [[1, 0, 0, 0], [half, 0, 0, half], [half, 0, 0, half]], atol=1e-15)
+        np.testing.assert_array_equal(frame["vx"], [0, 0, 3])
+        np.testing.assert_array_equal(frame["vy"], [0, 0, 2])
+        self.check_sizes(frame)
+
+    def test_variables_and_random_orientations_on_any_ranks(self):
+        commands = ("variable s atom 0.3+0.1*id\nvariable d equal 40\nset group all nurbs/scale v_s density v_d\n"
+                    "region r block 0 2 -1 1 1 5 units box\nset region r quat/random 12345\nset atom 1 diameter 3\n")
+        one, two = (after(commands, ranks) for ranks in (1, 2))
+        for name in one:
+            np.testing.assert_array_equal(one[name], two[name], name)
+        np.testing.assert_allclose(one["c_b[6]"], [1.5 / np.linalg.norm(AXES), 0.5, 0.6], rtol=1e-6)
+        self.check_sizes(one)
+        q = quaternions(one)
+        np.testing.assert_allclose(np.linalg.norm(q, axis=1), 1, rtol=1e-14)
+        np.testing.assert_array_equal(q[0], [1, 0, 0, 0])
+        self.assertGreater(np.abs(q[1] - q[2]).max(), 0.1)
+
+    def test_random_orientations_are_isotropic(self):
+        text = DECK.replace("read_data in.data", "lattice sc 0.5\nregion b block -6 6 -6 6 0 6 units box\ncreate_box 1 b\n"
+                            "create_atoms 1 region b\nset group all nurbs/scale 0.1 density 1 quat/random 99991")
+        w, x, y, z = quaternions(after("", text=text)).T
+        third = np.stack([2 * (x * z + w * y), 2 * (y * z - w * x), 1 - 2 * (x * x + y * y)])
+        n = len(w)
+        self.assertGreater(n, 5000)
+        self.assertLess(np.abs(third @ third.T / n - np.eye(3) / 3).max(), 4 * 0.3 / np.sqrt(n))
+        self.assertLess(np.abs(third.mean(axis=1)).max(), 4 * 0.58 / np.sqrt(n))
+
+    def test_fix_set(self):
+        frame = after("group g type 2\nfix s g set/nurbs shape cube scale 0.3 density 10 quat 1 0 0 180\n")
+        np.testing.assert_array_equal(frame["c_b[5]"], [1, 2, 2])
+        np.testing.assert_array_equal(frame["c_b[6]"], [1, 0.5, 0.3])
+        np.testing.assert_array_equal(frame["density"], [1000, 2000, 10])
+        np.testing.assert_allclose(quaternions(frame)[2], [0, 1, 0, 0], atol=1e-15)
+        self.check_sizes(frame)
+
+
+class OtherCommands(unittest.TestCase):
+    def test_displace_atoms_rotate_turns(self):
+        for ranks in (1, 2):
+            frame = after("group g id 1 2\ndisplace_atoms g rotate 0 0 0 0 0 3 90\n", ranks)
+            half = np.sqrt(0.5)
+            np.testing.assert_allclose(quaternions(frame)[:2], [[half, 0, 0, half]] * 2, atol=1e-15)
+            np.testing.assert_allclose(quaternions(frame)[2, :2] / quaternions(frame)[2, 0], [1, 0.3], atol=1e-15)
+            np.testing.assert_allclose([frame["x"][:2], frame["y"][:2]], [[0, 0], [-1, 1]], atol=1e-15)
+
+    def test_fix_move_rotate_turns(self):
+        """A quarter of a turn, in two runs and over a restart; the same for a body that starts anywhere."""
+        text = DECK.replace("fix motion all", "group a id 1 3\ngroup rest subtract all a\n"
+                            "fix spin a move rotate 0.5 0 0 0 0 -2 0.4\nfix motion rest")
+        start = np.array([1.0, 0.3, 0, 0]) / np.hypot(1, 0.3)
+        half = np.sqrt(0.5)
+        turned = np.array([half * start[0], half * start[1], -half * start[1], -half * start[0]])
+        for ranks in (1, 2):
+            frame = after("run 400\nrun 600\n", ranks, text)
+            np.testing.assert_allclose(quaternions(frame)[0], [half, 0, 0, -half], atol=1e-12)
+            np.testing.assert_allclose(quaternions(frame)[2], turned, atol=1e-12)
+            np.testing.assert_allclose([frame["x"][0], frame["y"][0]], [0.5, 1.5], atol=1e-12)
+            np.testing.assert_allclose(frame["omegaz"][[0, 2]], -2 * np.pi / 0.4, rtol=1e-14)
+        run = deck.run_ok(text + "run 400\nwrite_restart half.restart\n", files=files())
+        again = text[:text.index("atom_style")] + "atom_modify map array\nboundary p p f\nread_restart half.restart\n"
+        again += text[text.index("neighbor"):text.index("pair_style")] + text[text.index("fix floor"):].replace("group", "#")
+        again += "run 600\n" + DUMP
+        frame = deck.run_ok(again, files={"half.restart": run.path / "half.restart"}).dump("dump.txt")[-1][1]
+        np.testing.assert_allclose(quaternions(frame)[2], turned, atol=1e-12)
+
+    def test_create_atoms_with_a_template(self):
+        model = ("fix t all particletemplate/nurbs 15485863 atom_type 1 density constant 2500 shape cube scale uniform 0.2 0.4\n"
+                 "lattice sc 3\nregion u block -5 -2 -5 5 5 10 units box\ncreate_atoms 2 region u template t\n")
+        one, two = (after(model, ranks) for ranks in (1, 2))
+        for frame in (one, two):
+            self.assertEqual(len(frame["x"]), 9)
+            scale = frame["c_b[6]"][3:]
+            self.assertTrue(((scale >= 0.2) & (scale <= 0.4)).all())
+            self.assertEqual(len(set(scale)), 6)
+            np.testing.assert_allclose(frame["mass"][3:], 2500 * scale**3, rtol=1e-13)
+        order = [np.lexsort((frame["z"], frame["y"], frame["x"])) for frame in (one, two)]
+        for name in ("c_b[1]", "c_b[4]", "c_b[6]", "mass"):
+            np.testing.assert_array_equal(one[name][order[0]], two[name][order[1]])
+
+    def test_thermo_erotate(self):
+        velocities = [(1, 0.0, 0.0, 0.0, 1.0, 2.0, 3.0), (2, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0), (3, 0.0, 0.0, 0.0, 0.0, 5.0, 0.0)]
+        text = DECK + ("compute mine all erotate/nurbs\ncompute hosts all erotate\nthermo_style custom step erotate c_mine c_hosts\n"
+                       "thermo_modify norm no\nrun 0\n")
+        run = deck.run_ok(text, files=files(velocities))
+        values = [run.thermo[name][-1] for name in run.thermo if name != "Step"]
+        self.assertGreater(values[0], 0)
+        self.assertEqual(values, [values[0]] * 3)
+
+
+class Refused(unittest.TestCase):
+    def refuse(self, text, *expected, ranks=1):
+        run = deck.run(text, ranks=ranks, files=files())
+        self.assertNotEqual(run.status, 0, run.screen)
+        self.assertTrue(run.errors, run.screen)
+        for words in expected:
+            self.assertIn(words, run.errors[0])
+
+    def test_settings(self):
+        run = "run 1\n"
+        for ranks, text, *expected in (
+                (2, DECK.replace("0.3 bin", "0.3 multi"), "neighbor .. multi", "use bin"),
+                (1, DECK + "run_style respa 2 2 pair 1\n", "run_style respa", "verlet"),
+                (1, DECK + "change_box all triclinic\n", "triclinic", "orthogonal"),
+                (1, DECK.replace("pair_style", "#").replace("pair_coeff", "#"), "no pair_style gran/nurbs"),
+                (1, DECK.replace("gran/nurbs", "hybrid gran/nurbs").replace("* * kn", "* * gran/nurbs kn"), "hybrid"),
+                (1, DECK.replace("pair_style gran/nurbs", "pair_style sph/artVisc/tensCorr").replace("pair_coeff", "#"), "pair")):
+            self.refuse(text + run, *expected, ranks=ranks)
+        self.refuse(DECK + "minimize 1e-4 1e-4 10 10\n", "minimize")
+
+    def test_fixes(self):
+        plane = "model hooke tangential history primitive type 1 zplane 0.0"
+        for command, *expected in (
+                ("fix motion all nve", "Fix nve motion", "fix nve/nurbs"), ("fix motion all nve/noforce", "fix nve/nurbs"),
+                ("fix motion all nve/limit radius_ratio 0.1", "fix nve/nurbs"), ("fix motion all nve/sphere", "sphere"),
+                ("fix motion all rigid single", "rigid", "fix nve/nurbs"),
+                ("variable d equal 2\nfix a all adapt 1 atom diameter v_d", "Fix adapt a", "nurbs/scale"),
+                (f"fix w all wall/gran {plane}", "Fix wall/gran", "fix wall/nurbs"),
+                ("region r block -6 6 -6 6 0 12\nfix w all wall/region r lj126 1 1 2", "Fix wall/region", "fix wall/nurbs")):
+            text = DECK.replace("fix motion all nve/nurbs", "") if "fix motion" in command else DECK
+            self.refuse(text + command + "\nrun 1\n", *expected)
+
+    def test_commands(self):
+        for command, *expected in (
+                ("set group all nurbs/shape ball", "shape ball", "box cube"), ("set group all nurbs/scale 0", "nurbs/scale = 0", "> 0"),
+                ("set group all nurbs/scale", "nurbs/scale needs 1 value"), ("set group all nurbs/size 1", "nurbs/size", "nurbs/scale"),
+                ("set group all density -1", "density = -1", "> 0"), ("set group none density 1", "no group none"),
+                ("set atom 1 quat 0 0 0 10", "axis 0 0 0"), ("set group all quat 1 0 0", "quat needs 4 values"),
+                ("set group all nurbs/scale v_x", "no variable x"), ("set all all density 1", "all must be one of"),
+                ("variable x atom id-2\nset group all nurbs/scale v_x", "v_x must be a number > 0"),
+                ("fix s all set/nurbs", "needs one of shape scale"), ("fix s all set/nurbs size 1", "unknown keyword size"),
+                ("create_atoms 1 single 4 4 4 template x", "template x is no fix particletemplate/nurbs"),
+                ("create_atoms 1 single 4 4 4 template", "needs the ID"), ("replicate 2 1 1 offset 12 0 0", "Replicate"),
+                ("read_dump x.txt 0 x y z", "Read_dump")):
+            self.refuse(DECK + command + "\n", *expected)
+        self.refuse(DECK + "set group all nurbs/shape ball\n", "shape ball", ranks=2)
+
+
+class Warned(unittest.TestCase):
+    def warnings(self, text, more=None, ranks=1):
+        run = deck.run_ok(text, files={**files(), **(more or {})}, ranks=ranks)
+        return [line for line in run.screen.splitlines() if line.startswith("WARNING")]
+
+    def test_default_density(self):
+        text = DECK + "create_atoms 1 single 4 4 4\n"
+        self.assertIn("1 particles made by create_atoms have density 1", "".join(self.warnings(text + "run 0\n")))
+        for setting in ("set group all density 1\n", "set atom 4 density 2\n"):
+            self.assertNotIn("density", "".join(self.warnings(text + setting + "run 0\n")))
+
+    def test_move_without_turning(self):
+        text = DECK.replace("nve/nurbs", "move linear 1 0 0")
+        self.assertEqual(self.warnings(text + "run 1\n"), [])
+        self.assertIn("doesn't turn", "".join(self.warnings(text + "set atom 1 omegax 3\nrun 1\n")))
+
+    def test_mesh_that_is_no_wall(self):
+        """Told once for all runs; not of a mesh that counts."""
+        mesh = "solid m\nfacet normal 0 0 1\nouter loop\nvertex -5 -5 1\nvertex 5 -5 1\nvertex 0 5 1\nendloop\nendfacet\nendsolid m\n"
+        text = DECK + "fix m all mesh/surface/planar file m.stl type 1\n"
+        for ranks in (1, 2):
+            told = [line for line in self.warnings(text + "run 1\nrun 1\n", {"m.stl": mesh}, ranks) if "is no wall" in line]
+            self.assertEqual(len(told), 1)
+        counted = text + "fix c all massflow/mesh mesh m count once vec_side 0 0 -1\nrun 1\n"
+        self.assertNotIn("is no wall", "".join(self.warnings(counted, {"m.stl": mesh})))
+
+    def test_sphere_volumes(self):
+        self.assertIn("bounding spheres", "".join(self.warnings(DECK + "fix w all buoyancy level 3 dim z density 1000\nrun 1\n")))
+
+    def test_wall_of_another_name_after_a_restart(self):
+        run = deck.run_ok(DECK + "set group all z 0.2\nset atom 2 x 4 z 0.2\nrun 1\nwrite_restart a.restart\n", files=files())
+        restart = {"a.restart": run.path / "a.restart"}
+        again = DECK[:DECK.index("atom_style")] + "boundary p p f\nread_restart a.restart\n" + DECK[DECK.index("neighbor"):]
+        again = again.replace("pair_style", "#").replace("pair_coeff", "#") + "run 1\n"
+        for ranks in (1, 2):
+            told = "".join(self.warnings(again.replace("fix floor", "fix ground"), restart, ranks))
+            self.assertIn("contacts of fix wall/nurbs floor", told)
+            self.assertNotIn("restart file holds", "".join(self.warnings(again, restart, ranks)))
+
+
+if __name__ == "__main__":
+    unittest.main()
