@@ -5,18 +5,6 @@
 
 namespace nurbs {
 
-SurfaceCurvature curvature_of(const SupportModel& model, const Mat3& axes) {
-  const double det = model.w0 * model.w2 - model.w1 * model.w1;
-  if (!(det > 0) || !(model.w0 > 0)) return {};
-  const Vec3 n = axes * vec(model.normal), t = axes * vec(model.tangent), s = n.cross(t);
-  SurfaceCurvature k;
-  k.tensor = (model.w2 * t * t.transpose() - model.w1 * (t * s.transpose() + s * t.transpose()) +
-              model.w0 * s * s.transpose()) /
-             det;
-  k.known = k.tensor.allFinite();
-  return k;
-}
-
 // II in the orthonormal frame (t, s): J^-T II J^-1, with J = (lu, t.sv; 0, s.sv) from parameters to the
 // frame.
 SurfaceCurvature curvature_at(const Particle& particle, const PointMemory& point, const Vec3& outward) {
@@ -25,6 +13,11 @@ SurfaceCurvature curvature_at(const Particle& particle, const PointMemory& point
   if (!(point.patch >= 0) || patch >= static_cast<int>(particle.shape->patches.size())) return {};
   JetLanes jet;
   evaluate2(particle.shape->patches[patch], point.u, point.v, &jet);
+  const double shortest = std::fmin(jet.at(Slot::kSu).norm(), jet.at(Slot::kSv).norm());
+  if (shortest < kBesidePole * particle.shape->bounding_radius) {
+    const auto beside = [](double x) { return std::fmin(std::fmax(x, kBesidePole), 1 - kBesidePole); };
+    evaluate2(particle.shape->patches[patch], beside(point.u), beside(point.v), &jet);
+  }
   scale(particle.scale, &jet);
   const Vec3 su = jet.at(Slot::kSu), sv = jet.at(Slot::kSv), cross = su.cross(sv);
   const double area = cross.norm(), lu = su.norm();
@@ -43,6 +36,13 @@ SurfaceCurvature curvature_at(const Particle& particle, const PointMemory& point
              ss * lab_s * lab_s.transpose();
   c.known = c.tensor.allFinite();
   return c;
+}
+
+SurfaceCurvature cylinder_curvature(const Vec3& origin, const Vec3& axis, double radius, const Vec3& point,
+                                    const Vec3& normal) {
+  const Vec3 around = axis.cross(normal);
+  const double sign = (point - origin).dot(normal - normal.dot(axis) * axis) < 0 ? -1 : 1;
+  return {sign / radius * around * around.transpose(), true};
 }
 
 double hertz_radius(double k_a, double k_b) {

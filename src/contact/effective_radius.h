@@ -10,6 +10,7 @@ namespace nurbs {
 constexpr double kFlatRadius = 8;
 // A surface whose normal is further from the contact's (rad, squared) meets it in a crease or a corner.
 constexpr double kCreaseAngle2 = 0.05 * 0.05;
+constexpr double kBesidePole = 1e-4;  // errors of truncation and of round-off are both below 1e-6 there
 
 // Curvature of a body's surface at a contact: a symmetric tensor of the tangent plane in lab axes, 1 /
 // length, positive for convex; zero for a plane. Unknown at creases and corners.
@@ -18,13 +19,17 @@ struct SurfaceCurvature {
   bool known = false;
 };
 
-// From a local model's half; `axes` turns the body's axes into the lab's.
-SurfaceCurvature curvature_of(const SupportModel& model, const Mat3& axes);
-// From the surface at a point, one evaluation (30 ns); `outward` is the contact's normal, away from the body.
+// Of a body's surface at a point, from one evaluation (30 ns); `outward` is the contact's normal, away from
+// the body. At a pole it is that beside it, kBesidePole of the patch away.
 SurfaceCurvature curvature_at(const Particle& particle, const PointMemory& point, const Vec3& outward);
 inline SurfaceCurvature plane_curvature() {
   return {Mat3::Zero(), true};
 }
+
+// Of a cylinder of this radius about a unit axis through `origin`, met at `point` with unit `normal` towards
+// the body: negative where the body is inside.
+SurfaceCurvature cylinder_curvature(const Vec3& origin, const Vec3& axis, double radius, const Vec3& point,
+                                    const Vec3& normal);
 
 // R_eff of two surfaces with the relative principal curvatures k_a, k_b (1 / length, > 0): the sphere on a
 // plane that is as stiff, F = 4/3 E* sqrt(R_eff) overlap^1.5. With x = ln((k_a + k_b) / (2 sqrt(k_a k_b)))
@@ -38,7 +43,7 @@ struct SphereCurvatures {
   double a, b;
 };
 // Where a curvature is unknown or the contact is flat (kFlatRadius) R_eff is `cap`, the smaller bounding
-// radius. `plane`: A is one.
+// radius. `plane`: A is one, or another wall; the whole is then B's.
 SphereCurvatures sphere_curvatures(const SurfaceCurvature& a, const SurfaceCurvature& b, const Vec3& normal,
                                    double cap, bool plane);
 inline SphereCurvatures flat_curvatures(double cap, bool plane) {

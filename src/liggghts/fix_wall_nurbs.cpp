@@ -382,6 +382,8 @@ void FixWallNurbs::compute_surface(nurbs::ContactStages::Step& step) {
                    motion_.velocity(step.setup ? time_ : time_ - 0.5 * step.dt));
   }
   if (neighbor->ago == 0) hand_in_surface();
+  if (kind_ == Kind::cylinder)
+    step.cylinder = {motion_.point(origin_, time_), motion_.direction(normal_, time_), radius_};
   stages_.begin_step(step);
   surface_.find(step, triangles_, moved, reinterpret_cast<nurbs::PairProof*>(proofs_[0]), &stages_);
   stages_.end_step(surface_.neighbours());

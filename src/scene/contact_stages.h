@@ -86,6 +86,11 @@ class ContactStages {
     const int* types = nullptr;
     int type_count = 0;
     const ContactCoefficients* laws = nullptr;
+    // The wall's surface, where it is a cylinder; a model asks how it is bent.
+    struct Cylinder {
+      Vec3 origin = Vec3::Zero(), axis = Vec3::UnitZ();
+      double radius = 0;  // 0: it is none
+    } cylinder;
     // Serves instead of the laws, which are then not read. Its contacts' memory must have been allotted.
     const ContactModel* model = nullptr;
     // Partner of neighbours with a < 0: a plane through its x with this normal; free = 0, mass infinite.
@@ -208,7 +213,8 @@ class ContactStages {
   ModelMemory& model_memory(const ContactBlock& block, int lane) {
     return *reinterpret_cast<ModelMemory*>(pool_.memory(block, lane));
   }
-  SphereCurvatures model_curvatures(const ContactBlock& block, int lane, const Vec3& normal) const;
+  SphereCurvatures model_curvatures(const ContactBlock& block, int lane,
+                                    const ContactGeometry& geometry) const;
   void apply_model(ContactBlock& block, const Results& results);
   void ask_model(ContactBlock& block, int lane, const ContactGeometry& geometry, bool moves_on);
   void book_model(const ContactBlock& block, int lane, const ContactState& before, const ModelMemory& old,

@@ -194,7 +194,8 @@ bool ContactStages::serve_flat(ContactBlock& block, int lane, LeftPolygon* left)
 // Towards the polygon's own stiffness; what the springs give up is booked.
 void ContactStages::relax_factor(const ContactBlock& block, int lane, FlatContact& flat,
                                  const PolygonState& state) {
-  const ContactCoefficients law = coefficients(block, lane);  // zeros where a model serves, which books itself
+  const ContactCoefficients law =
+      coefficients(block, lane);  // zeros where a model serves, which books itself
   const double before = flat.polygon.factor;
   double tangential = 0;  // energy at factor 1
   for (int k = 0; k < state.count; ++k) {

@@ -39,7 +39,7 @@ double volume_curvature(const Particle& p) {
 }  // namespace
 
 SphereCurvatures ContactStages::model_curvatures(const ContactBlock& block, int lane,
-                                                 const Vec3& normal) const {
+                                                 const ContactGeometry& g) const {
   const int a = block.a[lane], b = block.b[lane];
   const bool wall = a < 0;
   const Bodies& bodies = *step_.bodies;
@@ -49,9 +49,14 @@ SphereCurvatures ContactStages::model_curvatures(const ContactBlock& block, int 
   if (pool_.is_polygon(block)) return flat_curvatures(cap, wall);
   PointMemory on[2];
   block.get(lane, kLocalModelSize, 10, on);
-  const SurfaceCurvature of_a = wall ? plane_curvature() : curvature_at(bodies.particle(a), on[0], normal);
-  const SurfaceCurvature of_b = curvature_at(bodies.particle(b), on[1], -normal);
-  return sphere_curvatures(of_a, of_b, normal, cap, wall);
+  const SurfaceCurvature of_b = curvature_at(bodies.particle(b), on[1], -g.normal);
+  if (!wall)
+    return sphere_curvatures(curvature_at(bodies.particle(a), on[0], g.normal), of_b, g.normal, cap, false);
+  const Step::Cylinder& c = step_.cylinder;
+  const Vec3 point = load(record(b).x) + g.arm_b;
+  const SurfaceCurvature of_a =
+      c.radius > 0 ? cylinder_curvature(c.origin, c.axis, c.radius, point, g.normal) : plane_curvature();
+  return sphere_curvatures(of_a, of_b, g.normal, cap, true);
 }
 
 void ContactStages::apply_model(ContactBlock& block, const Results& results) {
@@ -69,7 +74,7 @@ void ContactStages::ask_model(ContactBlock& block, int lane, const ContactGeomet
 
   const bool known = own.curvature_a != 0 || own.curvature_b != 0;
   if (!known) {
-    const SphereCurvatures k = model_curvatures(block, lane, g.normal);
+    const SphereCurvatures k = model_curvatures(block, lane, g);
     own.curvature_a = k.a;
     own.curvature_b = k.b;
   }
@@ -122,7 +127,7 @@ void ContactStages::ask_model(ContactBlock& block, int lane, const ContactGeomet
     const double advance = std::sqrt(std::max(0.0, c.stiffness) / c.mass) * step_.dt;
     own.phase += advance;
     if (own.phase > kFrozenPhase) {
-      const SphereCurvatures k = model_curvatures(block, lane, g.normal);
+      const SphereCurvatures k = model_curvatures(block, lane, g);
       const double part = advance / (advance + kRelaxedPhase);
       own.curvature_a += part * (k.a - own.curvature_a);
       own.curvature_b += part * (k.b - own.curvature_b);
