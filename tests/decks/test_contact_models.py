@@ -277,6 +277,23 @@ class Energy(unittest.TestCase):
         self.assertLess(errors[0], 1e-5)
         self.assertLess(errors[1], 0.3 * errors[0])
 
+    def test_a_lasting_contact_follows_the_curvature(self):
+        """An ellipsoid that falls aslant, rocks and rests has the stiffness of the place it rests on; the ledger closes."""
+        axes, q, down = (2.0, 1.0, 1.0), unit(math.cos(0.5), 0, math.sin(0.5), 0), np.array([0, 0, -1.0])
+        values = {**PLAIN, "coefficientRestitution": 0.3, "coefficientFriction": 0.8,
+                  "coefficientRollingViscousDamping": 0.5}
+        run = run_bodies([Body(1, (0, 0, 0.01 * support(axes, q, down)[0] - 1e-6), q=q)], [models.ellipsoid(*axes)],
+                         "hertz tangential history rolling_friction epsd2", values, floor=True, gravity=9.81, dt=2e-5,
+                         steps=60000, every=6000)
+        weight = 4 / 3 * math.pi * 2e-6 * 2500 * 9.81
+        last = run.frames[-1][1]
+        h, _, w = support(axes, [last[f"c_body[{k}]"][0] for k in (1, 2, 3, 4)], down)
+        force = hertz_force(MODULUS, *curvatures([0.01 * w], down), 0.01 * h - last["z"][0])
+        self.assertAlmostEqual(force / weight, 1, delta=1e-3)
+        total = sum(run.thermo[name] for name in ("KinEng", "spin", "held[1]", "held[2]", "held[3]", "held[4]"))
+        total = total + weight * np.array([frame["z"][0] for _, frame in run.frames])
+        self.assertLess(np.abs(total - total[0]).max(), 1e-5 * weight * 0.01)
+
     def test_a_box_comes_to_rest_on_its_face(self):
         values = {**PLAIN, "coefficientRestitution": 0.3, "coefficientFriction": 0.5}
         box = deck.box_shape(1.0, 0.8, 0.6)
