@@ -24,7 +24,8 @@ namespace {
 
 constexpr double kTurn = 6.283185307179586;
 constexpr double kFrozenPhase = 5 * kTurn;   // of a contact whose spheres stay
-constexpr double kRelaxedPhase = 5 * kTurn;  // in which older ones come to 1 / e of their way
+constexpr double kRelaxedPhase = 5 * kTurn;  // in which older ones come to 1 / e of their way ...
+constexpr double kStride = kTurn / 8;        // ... by small steps, so that few steps evaluate surfaces
 
 // Of B relative to A at a contact point.
 Vec3 velocity_at(const BodyRecord& a, const BodyRecord& b, const Vec3& spin_a, const Vec3& spin_b,
@@ -124,11 +125,11 @@ void ContactStages::ask_model(ContactBlock& block, int lane, const ContactGeomet
 
   if (moves_on) {
     book_model(block, lane, before, old, state, own);
-    const double advance = std::sqrt(std::max(0.0, c.stiffness) / c.mass) * step_.dt;
-    own.phase += advance;
-    if (own.phase > kFrozenPhase) {
+    const double last = own.phase;
+    own.phase += std::sqrt(std::max(0.0, c.stiffness) / c.mass) * step_.dt;
+    if (own.phase > kFrozenPhase && std::floor(own.phase / kStride) != std::floor(last / kStride)) {
       const SphereCurvatures k = model_curvatures(block, lane, g);
-      const double part = advance / (advance + kRelaxedPhase);
+      const double part = kStride / (kStride + kRelaxedPhase);
       own.curvature_a += part * (k.a - own.curvature_a);
       own.curvature_b += part * (k.b - own.curvature_b);
     }

@@ -220,6 +220,16 @@ class EllipticalHertz(unittest.TestCase):
         self.assertAlmostEqual(f @ d / force, 1, delta=7e-5)
         self.assertLess(np.linalg.norm(f - f @ d * d), 1e-6 * force)
 
+    def test_in_and_on_a_cylinder(self):
+        axes, down, wall, overlap = (1.25, 1, 0.8), np.array([0, 0, -1.0]), 0.03, 2e-5
+        bent = np.linalg.inv(0.01 * support(axes, (1, 0, 0, 0), down)[2][:2, :2])
+        for inside in (1, -1):
+            run = run_bodies([Body(1, (0, 0, -inside * (wall - inside * 0.008) - overlap))],
+                             [models.ellipsoid(*map(float, axes))], "hertz",
+                             commands=f"fix pipe all wall/nurbs cylinder x {wall} 0 0 type 1 model hertz")
+            k = np.linalg.eigvalsh(bent - inside * np.diag([0, 1 / wall]))
+            self.assertAlmostEqual(run.frames[0][1]["fz"][0] / hertz_force(MODULUS, *k, overlap), 1, delta=7e-5)
+
     def test_flat_and_volume_radii(self):
         """A face on a plane has the bounding radius; `radius volume` that of the ball of equal volume."""
         overlap = 2e-5
@@ -232,6 +242,36 @@ class EllipticalHertz(unittest.TestCase):
                          radius="radius volume")
         self.assertAlmostEqual(run.frames[0][1]["fz"][0] / (4 / 3 * MODULUS * math.sqrt(0.01) * overlap**1.5), 1,
                                delta=1e-6)
+
+
+def plate(cells, half):
+    """STL of the square |x|, |y| <= half at z = 0, cut into 2 cells^2 triangles."""
+    edge, facets = np.linspace(-half, half, cells + 1), []
+    for x0, x1 in zip(edge, edge[1:]):
+        for y0, y1 in zip(edge, edge[1:]):
+            for corners in (((x0, y0), (x1, y0), (x1, y1)), ((x0, y0), (x1, y1), (x0, y1))):
+                vertices = "".join(f"vertex {x!r} {y!r} 0\n" for x, y in np.array(corners).tolist())
+                facets.append(f"facet normal 0 0 1\nouter loop\n{vertices}endloop\nendfacet\n")
+    return "solid plate\n" + "".join(facets) + "endsolid plate\n"
+
+
+class MeshWalls(unittest.TestCase):
+
+    def test_a_plate_of_triangles_is_a_plane(self):
+        """Springs, rolling and the curvature go from triangle to triangle."""
+        values = {**PLAIN, "coefficientRestitution": 0.6, "coefficientFriction": 0.4}
+        body = Body(1, (0, 0, 0.0145), (0.5, 0.2, -0.5), unit(3, 1, -2, 4), (20, -30, 10))
+        text, files = bodies_deck([body], [models.ellipsoid(1.25, 1.0, 0.8)],
+                                  "hertz tangential history cohesion sjkr rolling_friction epsd2", values, floor=True,
+                                  gravity=9.81, steps=6000, every=1000)
+        files["plate.stl"] = plate(4, 0.08)
+        plane = deck.run_ok(text, files=files)
+        mesh = deck.run_ok(text.replace("fix floor all wall/nurbs plane 0 0 0 0 0 1",
+                                        "fix plate all mesh/surface file plate.stl type 1\n"
+                                        "fix floor all wall/nurbs mesh plate"), files=files, ranks=2)
+        for run in (plane, mesh):
+            run.frames = run.dump("out.dump")
+        self.assertLess(difference(mesh, plane), 1e-11)
 
 
 class Energy(unittest.TestCase):
