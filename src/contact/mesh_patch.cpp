@@ -37,7 +37,7 @@ void MeshPatch::build_plane(const Vec3& origin, const Vec3& normal) {
   vertices_.clear();
   edges_.clear();
   cells_.clear();
-  planes_.assign(1, {normal, origin, 0, 0, 0, -1e300});
+  planes_.assign(1, {normal, origin, 0, 0, 0, -1e300, 0, 0, 0, 0, 0});
 }
 
 void MeshPatch::move_plane(const Vec3& origin, const Vec3& normal) {
@@ -61,17 +61,23 @@ void MeshPatch::weld(const Triangle* triangles, int count, double distance) {
   cells_.clear();
   corners_.clear();
   const double near2 = distance * distance;
+  // Vertices by their first coordinate, so that few are compared.
+  std::vector<std::pair<double, int>>& by_x = by_x_;
+  by_x.clear();
   for (int t = 0; t < count; ++t) {
     const Triangle& triangle = triangles[t];
     if (!(2 * area_vector(triangle).norm() > kNoArea * longest_side2(triangle))) continue;
     int at[3];
     for (int k = 0; k < 3; ++k) {
       at[k] = -1;
-      for (std::size_t v = 0; v < vertices_.size() && at[k] < 0; ++v)
-        if ((vertices_[v].x - triangle[k]).squaredNorm() <= near2) at[k] = static_cast<int>(v);
+      const double x = triangle[k][0];
+      auto near = std::lower_bound(by_x.begin(), by_x.end(), std::make_pair(x - distance, -1));
+      for (; near != by_x.end() && near->first <= x + distance && at[k] < 0; ++near)
+        if ((vertices_[near->second].x - triangle[k]).squaredNorm() <= near2) at[k] = near->second;
       if (at[k] >= 0) continue;
       at[k] = static_cast<int>(vertices_.size());
       vertices_.push_back({triangle[k], t, k, 0, 0, 0, 0, false});
+      by_x.insert(std::lower_bound(by_x.begin(), by_x.end(), std::make_pair(x, at[k])), {x, at[k]});
     }
     if (at[0] == at[1] || at[1] == at[2] || at[2] == at[0]) continue;
     cells_.push_back({t, -1, static_cast<int>(corners_.size()), 3});
@@ -161,16 +167,21 @@ void MeshPatch::find_planes(const Triangle* triangles, double distance) {
     }
     if (plane < 0) {
       plane = static_cast<int>(planes_.size());
-      planes_.push_back({area_vector(t).normalized(), t[0], 0, 0, cells_[c].triangle, 0});
+      planes_.push_back({area_vector(t).normalized(), t[0], 0, 0, cells_[c].triangle, 0, 0, 0, 0, 0, 0});
     }
     cells_[c].plane = plane;
   }
-  cells_in_.clear();
-  for (std::size_t p = 0; p < planes_.size(); ++p) {
-    planes_[p].first = static_cast<int>(cells_in_.size());
-    for (std::size_t c = 0; c < cells_.size(); ++c)
-      if (cells_[c].plane == static_cast<int>(p)) cells_in_.push_back(static_cast<int>(c));
-    planes_[p].cells = static_cast<int>(cells_in_.size()) - planes_[p].first;
+  for (const Cell& cell : cells_) ++planes_[cell.plane].cells;
+  int total = 0;
+  for (Plane& p : planes_) {
+    p.first = total;
+    total += p.cells;
+    p.cells = 0;
+  }
+  cells_in_.resize(total);
+  for (std::size_t c = 0; c < cells_.size(); ++c) {
+    Plane& p = planes_[cells_[c].plane];
+    cells_in_[p.first + p.cells++] = static_cast<int>(c);
   }
 }
 
@@ -260,6 +271,40 @@ void MeshPatch::classify() {
   for (Vertex& v : vertices_) {
     v.inner = true;
     for (int i = 0; i < v.edges; ++i) v.inner = v.inner && edges_[edges_at_[v.first_edge + i]].inner;
+  }
+  signs_.assign(corners_.size(), 0);
+  for (const Edge& e : edges_)
+    for (int i = e.first_side; i < e.first_side + e.sides; ++i) {
+      const Cell& cell = cells_[sides_[i].cell];
+      for (int k = cell.first; k < cell.first + cell.corners; ++k)
+        if (edge_of_[k] == static_cast<int>(&e - edges_.data())) signs_[k] = sides_[i].sign;
+    }
+  list_outlines();
+}
+
+// The edges and vertices of every plane that do not lie within it; an edge belongs to the planes of its
+// cells.
+void MeshPatch::list_outlines() {
+  edges_in_.clear();
+  vertices_in_.clear();
+  for (Plane& p : planes_) {
+    p.first_edge = static_cast<int>(edges_in_.size());
+    p.first_vertex = static_cast<int>(vertices_in_.size());
+    p.hint = cells_in_[p.first];
+    for (int i = p.first; i < p.first + p.cells; ++i) {
+      const Cell& cell = cells_[cells_in_[i]];
+      for (int k = cell.first; k < cell.first + cell.corners; ++k) {
+        if (!edges_[edge_of_[k]].inner) edges_in_.push_back(edge_of_[k]);
+        if (!vertices_[corners_[k]].inner) vertices_in_.push_back(corners_[k]);
+      }
+    }
+    const auto unique = [](std::vector<int>& list, int first) {
+      std::sort(list.begin() + first, list.end());
+      list.erase(std::unique(list.begin() + first, list.end()), list.end());
+      return static_cast<int>(list.size()) - first;
+    };
+    p.edges = unique(edges_in_, p.first_edge);
+    p.vertices = unique(vertices_in_, p.first_vertex);
   }
 }
 

@@ -6,6 +6,7 @@
 
 #include <array>
 #include <cstdint>
+#include <utility>
 #include <vector>
 
 #include "nurbs/types.h"
@@ -41,9 +42,12 @@ class MeshPatch {
   struct Plane {
     Vec3 normal;  // unit; either way
     Vec3 origin;
-    int first, cells;  // cell numbers in cells_in()
-    int leader;        // the triangle whose plane it is
-    double expiry;     // of the caller: a path up to which the body is clear of it
+    int first, cells;            // cell numbers in cells_in()
+    int leader;                  // the triangle whose plane it is
+    double expiry;               // of the caller: a path up to which the body is clear of it
+    int first_edge, edges;       // that are not inner, in edge_in()
+    int first_vertex, vertices;  // likewise, in vertex_in()
+    int hint;                    // cell that had a point last
   };
 
   // From triangles in an order that does not depend on ranks; corners closer than `weld` (length) are one.
@@ -65,6 +69,9 @@ class MeshPatch {
   int edge_at(int i) const { return edges_at_[i]; }
   int cell_at(int i) const { return cells_at_[i]; }
   int cell_in(int i) const { return cells_in_[i]; }
+  int edge_in(int i) const { return edges_in_[i]; }
+  int vertex_in(int i) const { return vertices_in_[i]; }
+  double sign_of(int i) const { return signs_[i]; }  // of the cell of corner i about its side from there
   int corner(int i) const { return corners_[i]; }
   int edge_of(int i) const { return edge_of_[i]; }
   std::size_t bytes() const;
@@ -80,14 +87,17 @@ class MeshPatch {
   void link_vertices();
   void place();
   void classify();
+  void list_outlines();
 
   std::vector<Vertex> vertices_;
   std::vector<Edge> edges_;
   std::vector<Side> sides_;
   std::vector<Cell> cells_;
   std::vector<Plane> planes_;
-  std::vector<int> corners_, edge_of_, edges_at_, cells_at_, cells_in_, order_;
+  std::vector<int> corners_, edge_of_, edges_at_, cells_at_, cells_in_, edges_in_, vertices_in_, order_;
+  std::vector<double> signs_;
   std::vector<Key> keys_;
+  std::vector<std::pair<double, int>> by_x_;
   bool unbounded_ = false;
 };
 

@@ -10,6 +10,7 @@
 namespace nurbs {
 namespace {
 
+constexpr int kFewCells = 4;             // of a plane, up to which each is looked at on its own
 constexpr double kSamePlane = 1 - 1e-6;  // cosine: a former contact's polygon stood on this plane
 constexpr double kSameNormal = 0.9;      // cosine: a former contact this near has a start for the search
 
@@ -32,6 +33,7 @@ struct MetEdge {
 struct Workspace {
   std::vector<ActivePlane> planes;
   std::vector<MetEdge> edges;
+  std::vector<int> active;
   PlaneRegion region;
 };
 Workspace& workspace() {
@@ -57,21 +59,40 @@ class SurfaceSearch {
   void run() {
     out_.count = 0;
     out_.full = false;
+    std::vector<int>& active = workspace().active;
+    active.clear();
     planes_.resize(std::max(planes_.size(), patch_.planes().size()));
-    bool any = false;
-    for (std::size_t p = 0; p < patch_.planes().size(); ++p) any = look_at_plane(static_cast<int>(p)) || any;
-    if (any) {
-      for (std::size_t p = 0; p < patch_.planes().size(); ++p) {
-        if (!planes_[p].active) continue;
-        planes_[p].claimed = !particle_.shape->flats.empty() && stand_on(static_cast<int>(p));
-        if (!planes_[p].claimed) touch_face(static_cast<int>(p));
-      }
-      edges_.assign(patch_.edges().size(), MetEdge{});
-      for (std::size_t e = 0; e < edges_.size(); ++e) touch_edge(static_cast<int>(e));
-      for (std::size_t v = 0; v < patch_.vertices().size(); ++v) touch_vertex(static_cast<int>(v));
-    }
     out_.expiry = kFarAway;
-    for (const MeshPatch::Plane& plane : patch_.planes()) out_.expiry = std::min(out_.expiry, plane.expiry);
+    for (std::size_t p = 0; p < patch_.planes().size(); ++p) {
+      if (look_at_plane(static_cast<int>(p))) active.push_back(static_cast<int>(p));
+      out_.expiry = std::min(out_.expiry, patch_.planes()[p].expiry);
+    }
+    if (active.empty()) return;
+    for (const int p : active) {
+      planes_[p].claimed = !particle_.shape->flats.empty() && stand_on(p);
+      if (!planes_[p].claimed) touch_face(p);
+    }
+    // Edges and vertices belong to several planes: each is met with the first.
+    if (edges_.size() < patch_.edges().size()) edges_.resize(patch_.edges().size());
+    for (const int p : active) {
+      const MeshPatch::Plane& plane = patch_.planes()[p];
+      for (int i = 0; i < plane.edges; ++i)
+        edges_[patch_.edge_in(plane.first_edge + i)].state = MetEdge::unknown;
+    }
+    for (const int p : active) {
+      const MeshPatch::Plane& plane = patch_.planes()[p];
+      for (int i = 0; i < plane.edges; ++i) {
+        const int e = patch_.edge_in(plane.first_edge + i);
+        if (first_plane_of(patch_.edges()[e]) == p) touch_edge(e);
+      }
+    }
+    for (const int p : active) {
+      const MeshPatch::Plane& plane = patch_.planes()[p];
+      for (int i = 0; i < plane.vertices; ++i) {
+        const int v = patch_.vertex_in(plane.first_vertex + i);
+        if (first_plane_of(patch_.vertices()[v]) == p) touch_vertex(v);
+      }
+    }
     if (out_.count > 0) out_.expiry = -kFarAway;
   }
 
@@ -111,6 +132,43 @@ class SurfaceSearch {
     return true;
   }
 
+  // Lower bound of the gap to the cells of a plane: along the line from the point of a cell that is nearest
+  // to the body's centre, by the atlas.
+  double clearance(const MeshPatch::Plane& plane) const {
+    double least = kFarAway;
+    for (int i = 0; i < plane.cells && least > 0; ++i) {
+      const Vec3 way = particle_.x - nearest(patch_.cells()[patch_.cell_in(plane.first + i)], plane);
+      const double distance = way.norm();
+      if (!(distance > 0)) return 0;
+      const double sphere = distance - radius_;
+      if (sphere > 0) {
+        least = std::min(least, sphere);
+        continue;
+      }
+      const double h =
+          particle_.scale * particle_.shape->atlas.support_upper(particle_.q.conjugate() * (-way / distance));
+      least = std::min(least, distance - h - kRoundoff * radius_);
+    }
+    return least;
+  }
+  // The point of a cell that is nearest to the body's centre.
+  Vec3 nearest(const MeshPatch::Cell& cell, const MeshPatch::Plane& plane) const {
+    const Vec3& c = particle_.x;
+    bool inside = true;
+    double least2 = kFarAway;
+    Vec3 best = Vec3::Zero();
+    for (int k = 0; k < cell.corners; ++k) {
+      const MeshPatch::Edge& e = patch_.edges()[patch_.edge_of(cell.first + k)];
+      const Vec3& a = patch_.vertices()[e.v[0]].x;
+      const Vec3 off = c - a;
+      if (patch_.sign_of(cell.first + k) * plane.normal.cross(e.direction).dot(off) >= 0) continue;
+      inside = false;
+      const Vec3 y = a + std::clamp(e.direction.dot(off), 0.0, e.length) * e.direction;
+      if ((c - y).squaredNorm() < least2) least2 = (c - y).squaredNorm(), best = y;
+    }
+    return inside ? Vec3(c - plane.normal.dot(c - plane.origin) * plane.normal) : best;
+  }
+
   // The ladder of a plane; true if the body overlaps it.
   bool look_at_plane(int number) {
     MeshPatch::Plane& plane = patch_.planes()[number];
@@ -121,6 +179,13 @@ class SurfaceSearch {
     if (std::abs(height) > radius_) {
       plane.expiry = path_ + (1 - 1e-12) * (std::abs(height) - radius_);
       return false;
+    }
+    if (plane.cells > 0 && plane.cells <= kFewCells) {
+      const double clear = clearance(plane);
+      if (clear > 0) {
+        plane.expiry = path_ + (1 - 1e-12) * clear;
+        return false;
+      }
     }
     met.normal = height < 0 ? Vec3(-plane.normal) : plane.normal;
     PairMemory& memory = met.memory;
@@ -153,13 +218,6 @@ class SurfaceSearch {
     const Vec3 x = particle_.x - patch_.vertices()[e.v[0]].x + met.deepest;
     return plane.normal.cross(e.direction).dot(x);
   }
-  double sign_of(int edge, int cell) const {
-    const MeshPatch::Edge& e = patch_.edges()[edge];
-    for (int i = e.first_side; i < e.first_side + e.sides; ++i)
-      if (patch_.side(i).cell == cell) return patch_.side(i).sign;
-    return 0;
-  }
-
   // Whether a cell has the deepest point. Borders of the plane are no part of it, cuts within it are.
   bool holds(int number, const ActivePlane& met) const {
     const MeshPatch::Cell& cell = patch_.cells()[number];
@@ -167,7 +225,7 @@ class SurfaceSearch {
     for (int k = 0; k < cell.corners; ++k) {
       const int edge = patch_.edge_of(cell.first + k);
       const MeshPatch::Edge& e = patch_.edges()[edge];
-      const double s = sign_of(edge, number) * inside(met, plane, e);
+      const double s = patch_.sign_of(cell.first + k) * inside(met, plane, e);
       if (!(e.inner ? s >= 0 : s > 0)) return false;
     }
     return true;
@@ -176,10 +234,14 @@ class SurfaceSearch {
   void touch_face(int number) {
     const MeshPatch::Plane& plane = patch_.planes()[number];
     const ActivePlane& met = planes_[number];
-    int triangle = patch_.unbounded() ? 0 : -1;
-    for (int i = 0; i < plane.cells && triangle < 0; ++i) {
-      const int cell = patch_.cell_in(plane.first + i);
-      if (holds(cell, met)) triangle = patch_.cells()[cell].triangle;
+    int triangle = -1;
+    if (patch_.unbounded()) return add_plane(number, 0, false);
+    // The cell that had the point in the last step has it mostly again.
+    for (int i = -1; i < plane.cells && triangle < 0; ++i) {
+      const int cell = i < 0 ? plane.hint : patch_.cell_in(plane.first + i);
+      if (!holds(cell, met)) continue;
+      triangle = patch_.cells()[cell].triangle;
+      patch_.planes()[number].hint = cell;
     }
     if (triangle >= 0) add_plane(number, triangle, false);
   }
@@ -230,6 +292,13 @@ class SurfaceSearch {
     return true;
   }
 
+  int first_plane_of(const MeshPatch::Edge& e) const {
+    return patch_.cells()[patch_.side(e.first_side).cell].plane;
+  }
+  int first_plane_of(const MeshPatch::Vertex& v) const {
+    return patch_.cells()[patch_.cell_at(v.first_cell)].plane;
+  }
+
   bool all_open(const MeshPatch::Edge& e) const {
     for (int i = e.first_side; i < e.first_side + e.sides; ++i) {
       const ActivePlane& met = planes_[patch_.cells()[patch_.side(i).cell].plane];
@@ -250,7 +319,11 @@ class SurfaceSearch {
     if (weight == 0) return;
     const Vec3& a = patch_.vertices()[e.v[0]].x;
     const Vec3 apart = particle_.x - a;
-    if ((apart - apart.dot(e.direction) * e.direction).squaredNorm() > radius_ * radius_) return;
+    const Vec3 way = apart - std::clamp(apart.dot(e.direction), 0.0, e.length) * e.direction;
+    if (way.squaredNorm() > radius_ * radius_) {
+      edges_[number].state = MetEdge::clear;
+      return;
+    }
     Range r;
     if (!range(e, &r)) return;
     SurfacePoint start;
@@ -280,7 +353,7 @@ class SurfaceSearch {
         const int edge = patch_.edge_of(cell.first + k);
         const MeshPatch::Edge& e = patch_.edges()[edge];
         const double s = plane.normal.cross(e.direction).dot(y - patch_.vertices()[e.v[0]].x);
-        in = sign_of(edge, static_cast<int>(c)) * s > -kWithin * radius_;
+        in = patch_.sign_of(cell.first + k) * s > -kWithin * radius_;
       }
       if (in) return true;
     }
@@ -299,7 +372,7 @@ class SurfaceSearch {
       if (!shallowest || met.result.gap > shallowest->result.gap) shallowest = &met;
     }
     for (int i = 0; i < v.edges; ++i)
-      if (edges_[patch_.edge_at(v.first_edge + i)].state == MetEdge::clear) return;
+      if (state(patch_.edge_at(v.first_edge + i)) == MetEdge::clear) return;
     SurfacePoint start;
     const FeatureContact f =
         find_point_contact(particle_, v.x, shallowest->normal, point_for(shallowest->normal, &start));
@@ -315,11 +388,16 @@ class SurfaceSearch {
     add_feature(f, weight, patch_.cells()[patch_.cell_at(v.first_cell)].triangle);
   }
 
+  // Edges within a plane are not met.
+  MetEdge::State state(int edge) const {
+    return patch_.edges()[edge].inner ? MetEdge::unknown : edges_[edge].state;
+  }
+
   // Whether an edge climbs along d from its end at a vertex; by where the body met the edge, if it did.
   bool climbs(int edge, int vertex, const Vec3& d) const {
     const MeshPatch::Edge& e = patch_.edges()[edge];
     const bool first = e.v[0] == vertex;
-    switch (edges_[edge].state) {
+    switch (state(edge)) {
       case MetEdge::along:
         return true;
       case MetEdge::before:

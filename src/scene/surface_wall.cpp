@@ -10,12 +10,31 @@
 namespace nurbs {
 namespace {
 
+constexpr double kMargin =
+    0.2;  // of the bounding radius, between the body's sphere and triangles of no concern
 constexpr double kWeld = 1e-6;  // of the bounding radius: corners of a mesh this close are one
 
 Triangle triangle_at(const double* nodes, int number) {
   Triangle t;
   for (int k = 0; k < 3; ++k) t[k] = Vec3::Map(nodes + 9 * number + 3 * k);
   return t;
+}
+
+// Squared distance of a point from a triangle (Ericson 2005, section 5.1.5).
+double distance2(const Triangle& t, const Vec3& x) {
+  const Vec3 ab = t[1] - t[0], ac = t[2] - t[0], ap = x - t[0];
+  const Vec3 n = ab.cross(ac);
+  double least = kFarAway;
+  bool inside = true;
+  for (int k = 0; k < 3; ++k) {
+    const Vec3 &p = t[k], way = t[(k + 1) % 3] - p, off = x - p;
+    if (n.cross(way).dot(off) >= 0) continue;
+    inside = false;
+    const double s = std::clamp(off.dot(way) / way.squaredNorm(), 0.0, 1.0);
+    least = std::min(least, (off - s * way).squaredNorm());
+  }
+  const double height = n.dot(ap);
+  return inside ? height * height / n.squaredNorm() : least;
 }
 
 // Angular velocity that three moving points have, by least squares of w x e = change of velocity along e.
@@ -122,7 +141,7 @@ void SurfaceWall::find_for(int body, const ContactStages::Step& step,
     f.region = nullptr;
     if (c.flat) {
       if (regions_used_ == regions_.size()) regions_.emplace_back();
-      plane_region(*patches_[patch_of_[body]], c.plane, particle.x, &regions_[regions_used_]);
+      plane_region(patches_[patch_of_[body]]->mesh, c.plane, particle.x, &regions_[regions_used_]);
       f.region = &regions_[regions_used_++];
     }
     f.memory = c.memory;
@@ -140,9 +159,21 @@ void SurfaceWall::find_for(int body, const ContactStages::Step& step,
   stages->give(body, head, found_, contacts_.count);
 }
 
-void SurfaceWall::gather(int body, const std::vector<TriangleArray>& meshes) {
+// Bodies move little between two lists of neighbours: triangles further away than kMargin are left for later.
+void SurfaceWall::choose(const BodyRecord& body, int number, double path,
+                         const std::vector<TriangleArray>& meshes, Patch* patch) const {
+  const Vec3 x = load(body.x);
+  const double reach = (1 + kMargin) * body.radius;
+  patch->near.clear();
+  patch->until = path + kMargin * body.radius;
+  for (int k = first_[number]; k < first_[number + 1]; ++k)
+    if (distance2(triangle_at(meshes[near_[k].mesh].nodes, near_[k].triangle), x) <= reach * reach)
+      patch->near.push_back(k);
+}
+
+void SurfaceWall::gather(const Patch& patch, const std::vector<TriangleArray>& meshes) {
   triangles_.clear();
-  for (int k = first_[body]; k < first_[body + 1]; ++k)
+  for (const int k : patch.near)
     triangles_.push_back(triangle_at(meshes[near_[k].mesh].nodes, near_[k].triangle));
 }
 
@@ -153,25 +184,28 @@ void SurfaceWall::find_in_mesh(int body, const ContactStages::Step& step,
   bool made = false;
   if (patch_of_[body] < 0) {
     made = true;
-    if (patches_used_ == static_cast<int>(patches_.size())) patches_.push_back(std::make_unique<MeshPatch>());
+    if (patches_used_ == static_cast<int>(patches_.size())) patches_.push_back(std::make_unique<Patch>());
     patch_of_[body] = patches_used_++;
   }
-  MeshPatch& patch = *patches_[patch_of_[body]];
+  Patch& patch = *patches_[patch_of_[body]];
+  const double path = step.bodies->path()[body] + path_;
   if (kind_ == Kind::plane) {
+    patch.until = kFarAway;
     if (made)
-      patch.build_plane(origin_, axis_);
+      patch.mesh.build_plane(origin_, axis_);
     else
-      patch.move_plane(origin_, axis_);
-  } else if (made || path_ > 0) {
-    gather(body, meshes);
-    if (made)
-      patch.build(triangles_.data(), static_cast<int>(triangles_.size()),
-                  kWeld * step.bodies->record(body).radius);
-    else
-      patch.move(triangles_.data());
+      patch.mesh.move_plane(origin_, axis_);
+  } else if (made || path > patch.until) {
+    const BodyRecord& record = step.bodies->record(body);
+    choose(record, body, path, meshes, &patch);
+    gather(patch, meshes);
+    patch.mesh.build(triangles_.data(), static_cast<int>(triangles_.size()), kWeld * record.radius);
+  } else if (path_ > 0) {
+    gather(patch, meshes);
+    patch.mesh.move(triangles_.data());
   }
-  find_surface_contacts(particle, patch, step.settings, step.bodies->path()[body] + path_, former, count,
-                        &contacts_);
+  find_surface_contacts(particle, patch.mesh, step.settings, path, former, count, &contacts_);
+  contacts_.expiry = std::min(contacts_.expiry, patch.until);
 }
 
 void SurfaceWall::motion_at(const SurfaceContact& c, const Vec3& point, int body,
@@ -182,7 +216,7 @@ void SurfaceWall::motion_at(const SurfaceContact& c, const Vec3& point, int body
     out->velocity = motion_.velocity + motion_.spin.cross(point - motion_.centre);
     return;
   }
-  const Near& near = near_[first_[body] + c.triangle];
+  const Near& near = near_[patches_[patch_of_[body]]->near[c.triangle]];
   const TriangleArray& mesh = meshes[near.mesh];
   out->mark = near.triangle * kMostMeshes + near.mesh;
   out->spin = out->velocity = Vec3::Zero();
@@ -195,7 +229,7 @@ void SurfaceWall::motion_at(const SurfaceContact& c, const Vec3& point, int body
 std::size_t SurfaceWall::bytes() const {
   std::size_t sum = near_.capacity() * sizeof(Near) + first_.capacity() * sizeof(int) +
                     expiry_.capacity() * (sizeof(double) + sizeof(int));
-  for (const auto& patch : patches_) sum += patch->bytes();
+  for (const auto& patch : patches_) sum += patch->mesh.bytes();
   return sum;
 }
 

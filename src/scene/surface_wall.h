@@ -62,7 +62,15 @@ class SurfaceWall {
                 std::int32_t* head, ContactStages* stages);
   void find_in_mesh(int body, const ContactStages::Step& step, const std::vector<TriangleArray>& meshes,
                     const FormerContact* former, int count);
-  void gather(int body, const std::vector<TriangleArray>& meshes);
+  // A body's patch: its triangles near enough to be met before `until`.
+  struct Patch {
+    MeshPatch mesh;
+    std::vector<int> near;  // numbers in near_
+    double until = -kFarAway;
+  };
+  void choose(const BodyRecord& body, int number, double path, const std::vector<TriangleArray>& meshes,
+              Patch* patch) const;
+  void gather(const Patch& patch, const std::vector<TriangleArray>& meshes);
   void motion_at(const SurfaceContact& c, const Vec3& point, int body,
                  const std::vector<TriangleArray>& meshes, WallContact* out) const;
 
@@ -74,7 +82,7 @@ class SurfaceWall {
   std::vector<int> first_;      // of each body in near_
   std::vector<double> expiry_;  // path up to which a body is clear of the wall
   std::vector<int> patch_of_;   // body to patch, -1: not made
-  std::vector<std::unique_ptr<MeshPatch>> patches_;
+  std::vector<std::unique_ptr<Patch>> patches_;
   int patches_used_ = 0, bodies_near_ = 0, overflows_ = 0;
   double path_ = 0;  // of the wall since the last end_near
   std::vector<Triangle> triangles_;
