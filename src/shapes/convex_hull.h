@@ -1,0 +1,35 @@
+// Convex hulls of points (by Qhull): support function, distance of a point, mass.
+#pragma once
+
+#include <vector>
+
+#include "body/shape.h"
+#include "nurbs/types.h"
+#include "shapes/triangle_mesh.h"
+
+namespace nurbs {
+
+class ConvexHull {
+ public:
+  // Of finite points. Throws ShapeError when they lie in a plane, to within 1e-9 of their extent.
+  explicit ConvexHull(const std::vector<Vec3>& points);
+
+  const TriangleMesh& mesh() const { return mesh_; }  // vertices, and triangles wound outward
+  MassProperties properties() const { return mesh_properties(mesh_); }
+
+  // A vertex furthest along d (any length), by climbing from vertex `start` along edges: some steps if the
+  // start is near.
+  int support(const Vec3& d, int start) const;
+
+  // Upper bound of the distance from x to the hull, 0 inside: that to a point of it, found by Gilbert's,
+  // Johnson's and Keerthi's algorithm to 1e-9 of the extent; the search ends early at `enough`. `start` as
+  // above, and left at a vertex near x.
+  double distance(const Vec3& x, double enough, int& start) const;
+
+ private:
+  TriangleMesh mesh_;
+  std::vector<int> first_, neighbours_;  // of vertex i: [first_[i], first_[i + 1])
+  double extent_ = 0;
+};
+
+}  // namespace nurbs

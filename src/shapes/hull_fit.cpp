@@ -1,0 +1,299 @@
+// The ladder of bodies tried, in a frame in which the hull is about as wide in all directions; certificates.
+#include "shapes/hull_fit.h"
+
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <map>
+#include <queue>
+
+#include "body/support.h"
+#include "nurbs/affine.h"
+#include "shapes/convex_fit.h"
+#include "shapes/primitives.h"
+
+namespace nurbs {
+namespace {
+
+// Degree and spans of the bodies tried, by number of control points.
+constexpr int kLadder[][2] = {{3, 1}, {4, 1}, {3, 2}, {4, 2}, {3, 3}, {4, 3}, {3, 4}, {4, 4}, {3, 6}, {4, 6}, {3, 8}};
+constexpr double kCurvatureShare = 3;   // least curvature over the tolerance, both relative
+constexpr double kLeastCurvature = 0.002, kMostCurvature = 0.1;
+constexpr double kSurelyTooCoarse = 3;  // times the tolerance: the next rung is skipped
+constexpr int kClosestSteps = 40;
+constexpr double kClosestStride = 0.3;  // parameters
+constexpr int kMostPieces = 200000;
+
+// --- certificates
+
+// Upper bound of the distance from a point to the body, 0 where it is inside: Newton's method for the closest
+// surface point. A foot point from which the point is seen along the inward normal, nearer than the body's
+// inner radius, shows that it is inside; where nothing is shown, the distance to a surface point is returned.
+double distance_to_body(const Shape& shape, const Vec3& v, double enough) {
+  SurfacePoint at = find_support(shape, v.normalized()).where;
+  double best = 1e300;
+  for (int k = 0; k < kClosestSteps; ++k) {
+    const Jet2 j = evaluate2(shape.patches[at.patch], at.u, at.v);
+    const Vec3 off = v - j.s, cross = j.su.cross(j.sv);
+    const bool foot = off.cross(cross).norm() <= 1e-6 * off.norm() * cross.norm();
+    if (foot && off.dot(cross) <= 0 && off.norm() < shape.inner_radius) return 0;
+    best = std::min(best, off.norm());
+    if (best <= enough || foot) return best;
+    Mat2 hessian;
+    hessian << j.su.dot(j.su) - off.dot(j.suu), j.su.dot(j.sv) - off.dot(j.suv),
+        j.su.dot(j.sv) - off.dot(j.suv), j.sv.dot(j.sv) - off.dot(j.svv);
+    if (hessian.determinant() <= 0 || hessian(0, 0) <= 0)
+      hessian << j.su.dot(j.su), j.su.dot(j.sv), j.su.dot(j.sv), j.sv.dot(j.sv);
+    Vec2 step = hessian.inverse() * Vec2(off.dot(j.su), off.dot(j.sv));
+    if (!step.allFinite() || step.norm() < 1e-14) break;
+    if (step.norm() > kClosestStride) step *= kClosestStride / step.norm();
+    at = walk(shape, at, step[0], step[1]);
+  }
+  return best;
+}
+
+struct Piece {
+  BezierPatch patch;
+  double bound;   // of its distance to the hull
+  int vertex;     // of the hull, near it
+  bool operator<(const Piece& other) const { return bound < other.bound; }
+};
+
+// Largest distance of the control points to the hull.
+double control_distance(const BezierPatch& patch, const ConvexHull& hull, int& vertex) {
+  double most = 0;
+  for (const Vec4& p : patch.points) most = std::max(most, hull.distance(p.head<3>() / p[3], most, vertex));
+  return most;
+}
+
+// De Casteljau at 1/2 along one parameter.
+std::pair<BezierPatch, BezierPatch> halve(const BezierPatch& patch, bool in_u) {
+  std::pair<BezierPatch, BezierPatch> out{patch, patch};
+  const int n = in_u ? patch.degree_u : patch.degree_v, lines = in_u ? patch.degree_v : patch.degree_u;
+  for (int line = 0; line <= lines; ++line) {
+    const auto at = [&](BezierPatch& p, int k) -> Vec4& { return in_u ? p.point(k, line) : p.point(line, k); };
+    for (int i = 0; i <= n; ++i) {
+      at(out.second, n - i) = at(out.first, n);
+      for (int k = n; k > i; --k) at(out.first, k) = 0.5 * (at(out.first, k) + at(out.first, k - 1));
+    }
+  }
+  return out;
+}
+
+double outward_distance(const Shape& shape, const ConvexHull& hull, double resolution) {
+  std::priority_queue<Piece> pieces;
+  double found = 0;
+  int vertex = 0;
+  const auto add = [&](const BezierPatch& patch) {
+    pieces.push({patch, control_distance(patch, hull, vertex), vertex});
+    const Vec3 middle = evaluate0(patch, 0.5, 0.5);
+    found = std::max(found, hull.distance(middle, found, vertex));
+  };
+  for (const BezierPatch& patch : shape.patches) {
+    BezierPatch moved = patch;
+    for (Vec4& p : moved.points) p.head<3>() += p[3] * shape.mass.center;
+    add(moved);
+  }
+  for (int k = 0; k < kMostPieces && pieces.top().bound > found + resolution; ++k) {
+    const Piece worst = pieces.top();
+    pieces.pop();
+    vertex = worst.vertex;
+    const auto halves = halve(worst.patch, true);
+    for (const BezierPatch& half : {halves.first, halves.second}) {
+      const auto quarters = halve(half, false);
+      add(quarters.first);
+      add(quarters.second);
+    }
+  }
+  return pieces.top().bound;
+}
+
+// --- fits
+
+// The map that makes the hull's moments those of a unit ball, about its centre of mass.
+struct Frame {
+  Vec3 center;
+  Mat3 to, from;
+};
+
+Frame even_frame(const MassProperties& mass) {
+  const Mat3 gyration = mass.inertia / mass.volume;
+  const Mat3 covariance = 0.5 * gyration.trace() * Mat3::Identity() - gyration;
+  const Eigen::SelfAdjointEigenSolver<Mat3> axes(5 * covariance);
+  return {mass.center, axes.operatorInverseSqrt(), axes.operatorSqrt()};
+}
+
+double bounding_radius(const ConvexHull& hull, const Vec3& center) {
+  double radius = 0;
+  for (const Vec3& p : hull.mesh().points) radius = std::max(radius, (p - center).norm());
+  return radius;
+}
+
+// Signed distance from the hull along the facet that a point's ray meets: the ray's facet is the support point
+// of the polar hull, whose vertices are n / h of the facets.
+class RayTarget {
+ public:
+  explicit RayTarget(const ConvexHull& hull) : polar_(polar_points(hull)) {}
+
+  TargetOffset operator()(const Vec3& x, int& hint) const {
+    hint = polar_.support(x, hint);
+    const Vec3& q = polar_.mesh().points[hint];
+    const double h = 1 / q.norm();
+    return {h * (q.dot(x) - 1), h * q};
+  }
+
+ private:
+  static std::vector<Vec3> polar_points(const ConvexHull& hull) {
+    std::vector<Vec3> out;
+    const auto& p = hull.mesh().points;
+    for (const auto& t : hull.mesh().triangles) {
+      const Vec3 n = (p[t[1]] - p[t[0]]).cross(p[t[2]] - p[t[0]]);
+      const double h = n.dot(p[t[0]]);
+      if (h > 1e-9 * n.norm()) out.emplace_back(n / h);
+    }
+    return out;
+  }
+
+  ConvexHull polar_;
+};
+
+Vec3 ray(int face, double u, double v) {
+  return cube_direction(face, std::tan((2 * u - 1) * M_PI / 4), std::tan((2 * v - 1) * M_PI / 4)).normalized();
+}
+
+std::string percent(double x) {
+  char text[32];
+  std::snprintf(text, sizeof text, "%.3g %%", 100 * x);
+  return text;
+}
+
+class HullFitter {
+ public:
+  HullFitter(const ConvexHull& hull, const HullFitOptions& options)
+      : hull_(hull), options_(options), mass_(hull.properties()), frame_(even_frame(mass_)) {
+    radius_ = bounding_radius(hull, mass_.center);
+    tolerance_ = options.tolerance * radius_;
+  }
+
+  HullFit run() {
+    if (options_.spans == 0 && try_sphere()) return best_;
+    std::vector<Vec3> even;
+    for (const Vec3& p : hull_.mesh().points) even.emplace_back(frame_.to * (p - frame_.center));
+    const RayTarget target{ConvexHull(even)};
+    double reached = 1e300;
+    for (const auto& [degree, spans] : kLadder) {
+      if (options_.spans > 0 && spans != options_.spans) continue;
+      if (reached > kSurelyTooCoarse * options_.tolerance && reached < 1e300 && degree == 4) continue;
+      if (try_rung(degree, spans, target)) return best_;
+      reached = std::min(reached, last_error_);
+    }
+    throw ShapeError("no body of up to 1736 control points is within the tolerance of " +
+                     percent(options_.tolerance) + " of the hull; the best is within " + percent(least_) +
+                     ": raise the tolerance");
+  }
+
+ private:
+  bool try_sphere() {
+    double inner = 1e300;
+    const auto& p = hull_.mesh().points;
+    for (const auto& t : hull_.mesh().triangles) {
+      const Vec3 n = (p[t[1]] - p[t[0]]).cross(p[t[2]] - p[t[0]]);
+      inner = std::min(inner, n.dot(p[t[0]] - mass_.center) / std::max(n.norm(), 1e-300));
+    }
+    if (radius_ - inner > 2.5 * tolerance_) return false;
+    const double volume_radius = std::cbrt(3 * mass_.volume / (4 * M_PI));
+    for (double radius : {volume_radius, 0.5 * (radius_ + inner)}) {
+      std::vector<NurbsSurface> body = exact_ellipsoid(Vec3::Constant(radius));
+      transform(body, Mat3::Identity(), mass_.center);
+      if (judge(std::move(body), "sphere")) return true;
+    }
+    return false;
+  }
+
+  bool try_rung(int degree, int spans, const RayTarget& target) {
+    const SmoothCube cube(degree, spans);
+    const auto start = [&](int f, double u, double v) -> Vec3 {
+      if (!start_.empty()) return evaluate(start_[f], u, v);
+      return 0.9 * ray(f, u, v);
+    };
+    ConvexFitOptions options;
+    options.tolerance = 0.97 * tolerance_;
+    options.least_curvature = std::clamp(kCurvatureShare * options_.tolerance, kLeastCurvature, kMostCurvature);
+    options.most_curvature = 1 / options_.tolerance;
+    options.metric = frame_.to.transpose();
+    const OffsetTarget offset = [&](const Vec3& x, const Vec3&, int& hint) { return target(x, hint); };
+    const ConvexFit fit = fit_convex(cube, fit_points(cube, start), offset, options);
+    if (fit.error < start_error_) {
+      start_error_ = fit.error;
+      start_ = cube.surfaces(fit.points);
+    }
+    last_error_ = fit.error / radius_;
+    const std::string kind = std::string(degree == 3 ? "bicubic" : "biquartic") + ", " + std::to_string(spans) +
+                             " x " + std::to_string(spans) + " spans, " + std::to_string(cube.count()) +
+                             " control points";
+    if (fit.error > 1.5 * tolerance_) {
+      say(kind + (fit.error < 1e300 ? ": off by about " + percent(last_error_) : ": not convex"));
+      if (fit.error < 1e300) least_ = std::min(least_, last_error_);
+      return false;
+    }
+    std::vector<NurbsSurface> body = cube.surfaces(fit.points);
+    transform(body, frame_.from, frame_.center);
+    return judge(std::move(body), kind);
+  }
+
+  // Whether a body loads without a dent and is near enough; keeps it then.
+  bool judge(std::vector<NurbsSurface> surfaces, const std::string& kind) {
+    HullFit now;
+    now.surfaces = std::move(surfaces);
+    now.radius = radius_;
+    now.kind = kind;
+    std::vector<std::string> warnings;
+    try {
+      now.shape = make_shape("fit", now.surfaces, std::nullopt, &warnings);
+    } catch (const ShapeError& error) {
+      say(kind + ": " + error.what());
+      return false;
+    }
+    if (!warnings.empty() || now.shape->concavity > 1e-9 * radius_) {
+      say(kind + ": dented");
+      return false;
+    }
+    now.distance = hull_distance(*now.shape, hull_, 0.01 * tolerance_);
+    const double error = now.distance.worst() / radius_;
+    say(kind + ": within " + percent(error));
+    least_ = std::min(least_, error);
+    last_error_ = error;
+    if (error > options_.tolerance) return false;
+    best_ = std::move(now);
+    return true;
+  }
+
+  void say(const std::string& line) const {
+    if (options_.progress) options_.progress(line);
+  }
+
+  const ConvexHull& hull_;
+  const HullFitOptions& options_;
+  MassProperties mass_;
+  Frame frame_;
+  double radius_ = 0, tolerance_ = 0, last_error_ = 1e300, least_ = 1e300, start_error_ = 1e299;
+  std::vector<NurbsSurface> start_;
+  HullFit best_;
+};
+
+}  // namespace
+
+HullDistance hull_distance(const Shape& shape, const ConvexHull& hull, double resolution) {
+  HullDistance out;
+  out.outward = outward_distance(shape, hull, resolution);
+  for (const Vec3& p : hull.mesh().points)
+    out.inward = std::max(out.inward, distance_to_body(shape, p - shape.mass.center, out.inward));
+  return out;
+}
+
+HullFit fit_hull(const ConvexHull& hull, const HullFitOptions& options) {
+  return HullFitter(hull, options).run();
+}
+
+}  // namespace nurbs

@@ -1,0 +1,45 @@
+// Fit of a smooth convex body to a convex hull, with as few control points as a tolerance allows, and the
+// certificate of its error.
+#pragma once
+
+#include <functional>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "body/shape.h"
+#include "shapes/convex_hull.h"
+
+namespace nurbs {
+
+// Distances between a body and a hull, upper bounds but for round-off: that of each hull vertex to the body
+// is measured to a point of the body; each surface piece lies in the hull of its control points, whose
+// distances to the hull are measured, pieces being halved until that says little more than a surface point.
+struct HullDistance {
+  double outward = 0;  // of the body's farthest point from the hull
+  double inward = 0;   // of the hull's farthest point from the body
+  double worst() const { return outward > inward ? outward : inward; }
+};
+HullDistance hull_distance(const Shape& shape, const ConvexHull& hull, double resolution);
+
+struct HullFitOptions {
+  double tolerance = 0.01;  // of the hull's bounding radius about its centre of mass
+  int spans = 0;            // per patch and direction, 0: as few as do
+  std::function<void(const std::string&)> progress;  // told what was tried, a line at a time
+};
+
+struct HullFit {
+  std::vector<NurbsSurface> surfaces;  // in the hull's frame
+  std::shared_ptr<const Shape> shape;  // the same
+  HullDistance distance;
+  double radius = 0;  // the hull's bounding radius
+  std::string kind;   // "sphere" or "bicubic, 2 x 2 spans", ...
+};
+
+// The first of: an exact sphere; bicubic and biquartic bodies of smooth joints on six patches of growing
+// numbers of spans, whose certified distance is within the tolerance and which load without a dent. Throws
+// ShapeError when none is, naming the best that was reached.
+HullFit fit_hull(const ConvexHull& hull, const HullFitOptions& options);
+
+}  // namespace nurbs

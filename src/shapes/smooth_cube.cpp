@@ -1,0 +1,123 @@
+// Spline bases and joint conditions over a cube.
+#include "shapes/smooth_cube.h"
+
+#include <algorithm>
+#include <array>
+#include <map>
+
+namespace nurbs {
+namespace {
+
+int knot_multiplicity(int degree) {
+  return degree <= 3 ? std::max(degree - 1, 1) : degree - 2;
+}
+
+std::vector<double> spline_knots(int degree, int spans, int multiplicity) {
+  std::vector<double> knots(degree + 1, 0.0);
+  for (int k = 1; k < spans; ++k) knots.insert(knots.end(), multiplicity, static_cast<double>(k) / spans);
+  knots.insert(knots.end(), degree + 1, 1.0);
+  return knots;
+}
+
+// The q + 1 splines of degree q alive on the span that ends at knot k + 1 (NURBS Book A2.2).
+void splines(const std::vector<double>& knots, int q, int k, double t, double* b) {
+  b[0] = 1;
+  for (int p = 1; p <= q; ++p) {
+    double saved = 0;
+    for (int r = 0; r < p; ++r) {
+      const double right = knots[k + r + 1], left = knots[k + 1 - p + r], share = b[r] / (right - left);
+      b[r] = saved + (right - t) * share;
+      saved = (t - left) * share;
+    }
+    b[p] = saved;
+  }
+}
+
+// Coefficients over splines of degree q - 1 become those of the derivative's splines of degree q: the
+// transpose of differencing control points (NURBS Book eq. 2.7).
+void raise(const std::vector<double>& knots, int q, int k, const double* lower, double* out) {
+  for (int r = 0; r <= q; ++r) {
+    const int i = k - q + r;
+    const double before = r > 0 ? lower[r - 1] / (knots[i + q] - knots[i]) : 0;
+    const double after = r < q ? lower[r] / (knots[i + q + 1] - knots[i + 1]) : 0;
+    out[r] = q * (before - after);
+  }
+}
+
+}  // namespace
+
+SmoothCube::SmoothCube(int degree, int spans)
+    : degree_(degree),
+      spans_(spans),
+      multiplicity_(knot_multiplicity(degree)),
+      knots_(spline_knots(degree, spans, multiplicity_)),
+      net_((spans - 1) * multiplicity_ + degree + 1),
+      conditions_(joint_conditions()) {}
+
+SmoothCube::Basis SmoothCube::basis(int a, double t) const {
+  const int k = degree_ + a * multiplicity_;
+  const double at = (a + t) / spans_;
+  Basis out{};
+  splines(knots_, degree_, k, at, out.value);
+  double lower[kMaxDegree + 1];
+  splines(knots_, degree_ - 1, k, at, lower);
+  raise(knots_, degree_, k, lower, out.slope);
+  if (degree_ < 2) return out;
+  double lowest[kMaxDegree + 1];
+  splines(knots_, degree_ - 2, k, at, lowest);
+  raise(knots_, degree_ - 1, k, lowest, lower);
+  raise(knots_, degree_, k, lower, out.bend);
+  return out;
+}
+
+// D1 + D2 - (2 t - 1) e' at degree + 1 places of every span, which makes it vanish all along.
+Eigen::SparseMatrix<double> SmoothCube::joint_conditions() const {
+  const int last = net_.size() - 1;
+  const Basis start = basis(0, 0);
+  std::vector<Eigen::Triplet<double>> entries;
+  int rows = 0;
+  for (int edge = 0; edge < 12; ++edge) {
+    const int axis = edge / 4;
+    const int b0 = edge & 1 ? last : 0, b1 = edge & 1 ? last - 1 : 1;
+    const int c0 = edge & 2 ? last : 0, c1 = edge & 2 ? last - 1 : 1;
+    const auto at = [&](int k, int b, int c) {
+      std::array<int, 3> p{};
+      p[axis] = k;
+      p[(axis + 1) % 3] = b;
+      p[(axis + 2) % 3] = c;
+      return net_.index(p);
+    };
+    for (int a = 0; a < spans_; ++a) {
+      for (int place = 0; place <= degree_; ++place) {
+        const double t = (place + 0.5) / (degree_ + 1), whole = (a + t) / spans_;
+        const Basis s = basis(a, t);
+        std::map<int, double> row;
+        for (int k = 0; k <= degree_; ++k) {
+          const int at_k = a * multiplicity_ + k;
+          const double across = start.slope[1] * s.value[k];
+          row[at(at_k, b1, c0)] += across;
+          row[at(at_k, b0, c1)] += across;
+          row[at(at_k, b0, c0)] -= 2 * across + (2 * whole - 1) * s.slope[k];
+        }
+        double length = 0;
+        for (const auto& [column, value] : row) length += value * value;
+        for (const auto& [column, value] : row)
+          entries.emplace_back(rows, column, value / std::sqrt(length));
+        ++rows;
+      }
+    }
+  }
+  Eigen::SparseMatrix<double> out(rows, net_.count());
+  out.setFromTriplets(entries.begin(), entries.end());
+  return out;
+}
+
+std::vector<NurbsSurface> SmoothCube::surfaces(const NetPoints& points) const {
+  std::vector<Vec4> homogeneous;
+  homogeneous.reserve(points.rows());
+  for (int k = 0; k < points.rows(); ++k)
+    homogeneous.emplace_back(points(k, 0), points(k, 1), points(k, 2), 1);
+  return cube_surfaces(net_, degree_, knots_, homogeneous);
+}
+
+}  // namespace nurbs
