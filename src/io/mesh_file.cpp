@@ -17,7 +17,8 @@ constexpr size_t kMostTriangles = 50'000'000;
 
 std::string read_all(const std::string& file) {
   std::error_code error;
-  if (std::filesystem::is_directory(file, error)) throw ShapeError(file + ": is a directory, not a mesh file");
+  if (std::filesystem::is_directory(file, error))
+    throw ShapeError(file + ": is a directory, not a mesh file");
   std::ifstream in(file, std::ios::binary);
   if (!in) throw ShapeError(file + ": cannot open mesh file");
   std::string text((std::istreambuf_iterator<char>(in)), std::istreambuf_iterator<char>());
@@ -41,7 +42,8 @@ class Words {
   Words(const std::string& file, const std::string& text) : file_(file), text_(text) {}
 
   bool next(std::string& word) {
-    while (at_ < text_.size() && std::isspace(static_cast<unsigned char>(text_[at_]))) line_ += text_[at_++] == '\n';
+    while (at_ < text_.size() && std::isspace(static_cast<unsigned char>(text_[at_])))
+      line_ += text_[at_++] == '\n';
     const size_t begin = at_;
     while (at_ < text_.size() && !std::isspace(static_cast<unsigned char>(text_[at_]))) ++at_;
     word.assign(text_, begin, at_ - begin);
@@ -52,7 +54,8 @@ class Words {
     if (!next(word)) bad(std::string("ends before ") + what);
     char* end = nullptr;
     const double x = std::strtod(word.c_str(), &end);
-    if (*end != 0 || !std::isfinite(x)) bad("'" + word.substr(0, 40) + "' is not a finite number for " + what);
+    if (*end != 0 || !std::isfinite(x))
+      bad("'" + word.substr(0, 40) + "' is not a finite number for " + what);
     return x;
   }
   void skip_line() {
@@ -100,7 +103,8 @@ TriangleMesh read_binary_stl(const std::string& file, const std::string& text) {
     for (int i = 0; i < 3; ++i)
       for (int c = 0; c < 3; ++c) {
         corner[i][c] = little_float(&text[84 + 50 * k + 12 + 12 * i + 4 * c]);
-        if (!std::isfinite(corner[i][c])) fail(file, "triangle " + std::to_string(k) + " has a corner that is not finite");
+        if (!std::isfinite(corner[i][c]))
+          fail(file, "triangle " + std::to_string(k) + " has a corner that is not finite");
       }
     add_triangle(mesh, corner[0], corner[1], corner[2]);
   }
@@ -123,10 +127,12 @@ TriangleMesh read_ascii_stl(const std::string& file, const std::string& text) {
       in_loop = true;
     } else if (word == "vertex") {
       if (!in_loop) words.bad("vertex outside of a loop");
-      const double x = words.number("a coordinate"), y = words.number("a coordinate"), z = words.number("a coordinate");
+      const double x = words.number("a coordinate"), y = words.number("a coordinate"),
+                   z = words.number("a coordinate");
       corners.emplace_back(x, y, z);
     } else if (word == "endloop") {
-      if (corners.size() != 3) words.bad("a loop of " + std::to_string(corners.size()) + " vertices, must have 3");
+      if (corners.size() != 3)
+        words.bad("a loop of " + std::to_string(corners.size()) + " vertices, must have 3");
       add_triangle(mesh, corners[0], corners[1], corners[2]);
       in_loop = false;
     } else if (word == "facet") {
@@ -140,14 +146,16 @@ TriangleMesh read_ascii_stl(const std::string& file, const std::string& text) {
 }
 
 TriangleMesh read_stl(const std::string& file, const std::string& text) {
-  const bool sized = text.size() >= 84 && text.size() == 84 + 50 * static_cast<size_t>(little_endian(&text[80]));
+  const bool sized =
+      text.size() >= 84 && text.size() == 84 + 50 * static_cast<size_t>(little_endian(&text[80]));
   if (!sized && lower(text.substr(0, 5)) == "solid" && text.find('\0') == std::string::npos)
     return read_ascii_stl(file, text);
   return read_binary_stl(file, text);
 }
 
 void add_fan(TriangleMesh& mesh, const std::vector<int>& corners) {
-  for (size_t k = 2; k < corners.size(); ++k) mesh.triangles.push_back({corners[0], corners[k - 1], corners[k]});
+  for (size_t k = 2; k < corners.size(); ++k)
+    mesh.triangles.push_back({corners[0], corners[k - 1], corners[k]});
 }
 
 TriangleMesh read_obj(const std::string& file, const std::string& text) {
@@ -155,7 +163,9 @@ TriangleMesh read_obj(const std::string& file, const std::string& text) {
   std::istringstream in(text);
   std::string row;
   for (long line = 1; std::getline(in, row); ++line) {
-    const auto bad = [&](const std::string& what) { fail(file, "line " + std::to_string(line) + ": " + what); };
+    const auto bad = [&](const std::string& what) {
+      fail(file, "line " + std::to_string(line) + ": " + what);
+    };
     std::istringstream words(row);
     std::string kind;
     words >> kind;
@@ -174,10 +184,12 @@ TriangleMesh read_obj(const std::string& file, const std::string& text) {
         const long count = static_cast<long>(mesh.points.size());
         const long at = index < 0 ? count + index : index - 1;
         if ((*end != 0 && *end != '/') || end == word.c_str() || at < 0 || at >= count)
-          bad("face corner '" + word.substr(0, 40) + "', must name one of " + std::to_string(count) + " vertices");
+          bad("face corner '" + word.substr(0, 40) + "', must name one of " + std::to_string(count) +
+              " vertices");
         corners.push_back(static_cast<int>(at));
       }
-      if (corners.size() < 3) bad("a face of " + std::to_string(corners.size()) + " corners, must have 3 at least");
+      if (corners.size() < 3)
+        bad("a face of " + std::to_string(corners.size()) + " corners, must have 3 at least");
       add_fan(mesh, corners);
     }
   }
@@ -198,7 +210,8 @@ struct Element {
 int size_of(const std::string& type) {
   if (type == "char" || type == "uchar" || type == "int8" || type == "uint8") return 1;
   if (type == "short" || type == "ushort" || type == "int16" || type == "uint16") return 2;
-  if (type == "int" || type == "uint" || type == "int32" || type == "uint32" || type == "float" || type == "float32")
+  if (type == "int" || type == "uint" || type == "int32" || type == "uint32" || type == "float" ||
+      type == "float32")
     return 4;
   if (type == "double" || type == "float64") return 8;
   return 0;
@@ -215,7 +228,8 @@ class PlyReader {
     for (const auto& t : mesh.triangles)
       for (int i : t)
         if (i < 0 || static_cast<size_t>(i) >= mesh.points.size())
-          fail(file_, "a face names vertex " + std::to_string(i) + " of " + std::to_string(mesh.points.size()));
+          fail(file_,
+               "a face names vertex " + std::to_string(i) + " of " + std::to_string(mesh.points.size()));
     return mesh;
   }
 
@@ -236,7 +250,8 @@ class PlyReader {
       if (word == "end_header") break;
       if (word == "element") {
         Element e;
-        if (!(words >> e.name >> e.count) || e.count > kMostTriangles) fail(file_, "bad PLY header line '" + row + "'");
+        if (!(words >> e.name >> e.count) || e.count > kMostTriangles)
+          fail(file_, "bad PLY header line '" + row + "'");
         elements_.push_back(e);
       } else if (word == "property") {
         Property p;
@@ -250,7 +265,8 @@ class PlyReader {
     }
     ascii_ = format == "ascii";
     swap_ = format == "binary_big_endian";
-    if (!ascii_ && !swap_ && format != "binary_little_endian") fail(file_, "PLY format '" + format + "' is not known");
+    if (!ascii_ && !swap_ && format != "binary_little_endian")
+      fail(file_, "PLY format '" + format + "' is not known");
   }
 
   double value(const std::string& type) {
@@ -265,10 +281,9 @@ class PlyReader {
     }
     const size_t size = static_cast<size_t>(size_of(type));
     if (at_ + size > text_.size()) fail(file_, "the PLY file ends too early");
-    char bytes[8];
-    std::memcpy(bytes, &text_[at_], size);
+    char bytes[8] = {};
+    for (size_t k = 0; k < size && k < sizeof bytes; ++k) bytes[k] = text_[at_ + (swap_ ? size - 1 - k : k)];
     at_ += size;
-    if (swap_) std::reverse(bytes, bytes + size);
     const auto as = [&](auto x) {
       std::memcpy(&x, bytes, sizeof x);
       return static_cast<double>(x);

@@ -17,14 +17,15 @@ constexpr double kSmallestGain = 2e-3;  // relative fall of the cost at which a 
 constexpr double kFirstDamping = 1e-2, kLeastDamping = 1e-6, kLargestDamping = 1e4;
 constexpr double kFirstFairing = 1e-3, kLeastFairing = 1e-6, kFairingFall = 0.2;
 constexpr double kFirstPenalty = 10, kPenaltyGrowth = 6;
-constexpr double kCalm = 0.3;           // share of its weight that a sample without error keeps
-constexpr double kMostAsked = 0.3;      // curvature
-constexpr double kCutSlope = 1.2;  // distance of a corner cut off over that of the surface below it, about
-constexpr double kSlide = 0.05;         // distance from its ray that costs a point as much as an error of the tolerance
-constexpr double kHopeless = 5;       // times the tolerance after kHopeRounds rounds: given up
+constexpr double kCalm = 0.3;       // share of its weight that a sample without error keeps
+constexpr double kMostAsked = 0.3;  // curvature
+constexpr double kCutSlope = 1.2;   // distance of a corner cut off over that of the surface below it, about
+constexpr double kSlide =
+    0.05;  // distance from its ray that costs a point as much as an error of the tolerance
+constexpr double kHopeless = 5;  // times the tolerance after kHopeRounds rounds: given up
 constexpr int kHopeRounds = 5;
-constexpr double kSpeed2 = 2.5;          // squared speed of the parameters, about
-constexpr double kRegular = 1e-9;      // of the conditions' block of the matrix
+constexpr double kSpeed2 = 2.5;            // squared speed of the parameters, about
+constexpr double kRegular = 1e-9;          // of the conditions' block of the matrix
 constexpr double kCurvatureReserve = 0.5;  // share of the least curvature that must be met
 
 // Values and derivatives of the splines of one span at a grid's places, the same for u and v.
@@ -84,8 +85,8 @@ NetPoints gather(const Piece& piece, const NetPoints& points) {
 // The surface at a sample.
 struct Local {
   Vec3 x, xu, xv, xuu, xuv, xvv, normal;
-  double area;                    // |xu x xv|
-  double e, f, g, l, m, n;        // first and second form, the latter positive where convex
+  double area;              // |xu x xv|
+  double e, f, g, l, m, n;  // first and second form, the latter positive where convex
 
   double least_curvature() const {  // the smaller root k of det(II - k I) = 0
     const double mean = 0.5 * (e * n + g * l) - f * m, i = area * area;
@@ -219,7 +220,9 @@ class Fitter {
       : cube_(cube),
         target_(target),
         options_(options),
-        grid_(cube, cube.spans() == 1 ? 19 : cube.spans() == 2 ? 13 : 2 * cube.degree() + 3),
+        grid_(cube, cube.spans() == 1   ? 19
+                    : cube.spans() == 2 ? 13
+                                        : 2 * cube.degree() + 3),
         check_(cube, grid_.places() + 4),
         pieces_(make_pieces(cube)),
         system_(cube, pieces_) {
@@ -232,8 +235,11 @@ class Fitter {
     for (const Piece& piece : pieces_)
       for (int i = 0; i < grid_.places(); ++i)
         for (int j = 0; j < grid_.places(); ++j) {
-          const double u = (piece.a + i / (grid_.places() - 1.0)) / cube.spans(), v = (piece.b + j / (grid_.places() - 1.0)) / cube.spans();
-          rays_.push_back(cube_direction(piece.face, std::tan((2 * u - 1) * M_PI / 4), std::tan((2 * v - 1) * M_PI / 4)).normalized());
+          const double u = (piece.a + i / (grid_.places() - 1.0)) / cube.spans(),
+                       v = (piece.b + j / (grid_.places() - 1.0)) / cube.spans();
+          rays_.push_back(
+              cube_direction(piece.face, std::tan((2 * u - 1) * M_PI / 4), std::tan((2 * v - 1) * M_PI / 4))
+                  .normalized());
         }
     for (int a = 0; a < cube.spans(); ++a)
       for (int b = 0; b < cube.spans(); ++b)
@@ -310,7 +316,8 @@ class Fitter {
       const double bound = k ? options_.most_curvature : least_[at], sign = k ? -1 : 1;
       const Excess excess = curvature_excess(f, bound, sign);
       if (excess.value <= 0) continue;
-      const double unit = 1 / (kSpeed2 * (k ? bound : options_.least_curvature)), weight = share * (k ? kFirstPenalty : penalty_[at]);
+      const double unit = 1 / (kSpeed2 * (k ? bound : options_.least_curvature)),
+                   weight = share * (k ? kFirstPenalty : penalty_[at]);
       cost += weight * unit * unit * excess.value * excess.value;
       if (!sums) continue;
       const double a = excess.a, b = excess.b;  // sign (k |x_w|^2 + n . x_ww) along w = (a, b)
@@ -319,21 +326,24 @@ class Fitter {
       const Vec3 by_u = f.xv.cross(q) / f.area + 2 * bound * a * (a * f.xu + b * f.xv),
                  by_v = q.cross(f.xu) / f.area + 2 * bound * b * (a * f.xu + b * f.xv);
       const Vector second = a * a * s.col(3) + 2 * a * b * s.col(4) + b * b * s.col(5);
-      sums->add(sign * unit *
-                    (second * f.normal.transpose() + s.col(1) * by_u.transpose() + s.col(2) * by_v.transpose()),
-                unit * excess.value, weight);
+      sums->add(
+          sign * unit *
+              (second * f.normal.transpose() + s.col(1) * by_u.transpose() + s.col(2) * by_v.transpose()),
+          unit * excess.value, weight);
     }
     return cost;
   }
 
   // Keeps the parametrisation near that by rays from the origin, and the net smooth.
-  double add_order(const Local& f, const Shares& s, const Vec3& ray, double share, double damping, Sums* sums) {
+  double add_order(const Local& f, const Shares& s, const Vec3& ray, double share, double damping,
+                   Sums* sums) {
     const double hold = share / (kSlide * kSlide);
     const Vec3 aside = f.x - ray * ray.dot(f.x);
     if (sums) {
       sums->load += hold * s.col(0) * aside.transpose();
-      sums->load += share * fairing_ *
-                    (s.col(3) * f.xuu.transpose() + 2 * s.col(4) * f.xuv.transpose() + s.col(5) * f.xvv.transpose());
+      sums->load +=
+          share * fairing_ *
+          (s.col(3) * f.xuu.transpose() + 2 * s.col(4) * f.xuv.transpose() + s.col(5) * f.xvv.transpose());
       const Mat3 across = hold * (Mat3::Identity() - ray * ray.transpose());
       const double stay = share * damping / (options_.tolerance * options_.tolerance);
       for (int j = 0; j < s.rows(); ++j)
@@ -408,8 +418,8 @@ class Fitter {
     damping_ = damping;
   }
 
-  // Error and least curvature on the finer grid. Where curvature lacks there, the samples around are asked for
-  // more.
+  // Error and least curvature on the finer grid. Where curvature lacks there, the samples around are asked
+  // for more.
   ConvexFit measure() {
     ConvexFit out;
     out.points = points_;
@@ -430,7 +440,8 @@ class Fitter {
           out.least_curvature = std::min(out.least_curvature, curvature);
           const double lack = kCurvatureReserve * options_.least_curvature - curvature;
           if (!(lack > 0)) continue;
-          const double a = i * (places - 1.0) / (check_.places() - 1), b = j * (places - 1.0) / (check_.places() - 1);
+          const double a = i * (places - 1.0) / (check_.places() - 1),
+                       b = j * (places - 1.0) / (check_.places() - 1);
           for (int corner = 0; corner < 4; ++corner) {
             const int k = static_cast<int>(corner & 1 ? std::ceil(a) : std::floor(a)),
                       l = static_cast<int>(corner & 2 ? std::ceil(b) : std::floor(b));
@@ -452,7 +463,8 @@ class Fitter {
       for (int i = 0; i < grid_.places(); ++i)
         for (int j = 0; j < grid_.places(); ++j, ++at) {
           const Local f = local_surface(local, shares(piece, i, j));
-          if (f.least_curvature() < kCurvatureReserve * options_.least_curvature) penalty_[at] *= kPenaltyGrowth;
+          if (f.least_curvature() < kCurvatureReserve * options_.least_curvature)
+            penalty_[at] *= kPenaltyGrowth;
           if (i % 2 || j % 2) continue;
           const TargetOffset t = target_(f.x, f.normal, hint_[at]);
           error[at] = std::abs(t.distance) * scale(t);

@@ -8,8 +8,8 @@
 
 namespace nurbs {
 
-// Signed distance to first order from the target's surface, outside positive, and its unit gradient. `hint` is
-// the caller's to keep for one place of the fit: 0 at first, then what the last call left there.
+// Signed distance to first order from the target's surface, outside positive, and its unit gradient. `hint`
+// is the caller's to keep for one place of the fit: 0 at first, then what the last call left there.
 struct TargetOffset {
   double distance;
   Vec3 gradient;
@@ -32,11 +32,12 @@ struct ConvexFit {
   NetPoints last;              // the last net, convex or not: a start for a richer cube
 };
 
-// Starts from `start`, a net of smooth joints, and minimises, over nets of smooth joints, the sum over samples
-// of the squared distance to the target, with penalties where a normal curvature falls below the least one
-// wanted (damped Gauss-Newton; curvature is linearised exactly in the control points), then weights what errs
-// most and asks for more curvature where it lacks. Points stay near the rays of an equal-angle cube map. Target
-// and net in one frame, about the origin, about 1 in size. Deterministic. A second for some hundred points.
+// Starts from `start`, a net of smooth joints, and minimises, over nets of smooth joints, the sum over
+// samples of the squared distance to the target, with penalties where a normal curvature falls below the
+// least one wanted (damped Gauss-Newton; curvature is linearised exactly in the control points), then weights
+// what errs most and asks for more curvature where it lacks. Points stay near the rays of an equal-angle cube
+// map. Target and net in one frame, about the origin, about 1 in size. Deterministic. A second for some
+// hundred points.
 ConvexFit fit_convex(const SmoothCube& cube, const NetPoints& start, const OffsetTarget& target,
                      const ConvexFitOptions& options);
 

@@ -12,7 +12,7 @@ extern "C" {
 namespace nurbs {
 namespace {
 
-constexpr double kFlat = 1e-9;         // of the extent: points this near a plane have no hull
+constexpr double kFlat = 1e-9;          // of the extent: points this near a plane have no hull
 constexpr double kGjkTolerance = 1e-9;  // of the extent
 constexpr int kGjkIterations = 100;
 
@@ -44,8 +44,8 @@ std::vector<std::array<int, 3>> hull_triangles(const std::vector<Vec3>& points) 
   qh_zero(qh, nullptr);
   std::FILE* quiet = std::fopen("/dev/null", "w");
   char options[] = "qhull Qt Q12";
-  const int failed = qh_new_qhull(qh, 3, static_cast<int>(points.size()), coordinates.data(), False, options,
-                                  quiet, quiet);
+  const int failed =
+      qh_new_qhull(qh, 3, static_cast<int>(points.size()), coordinates.data(), False, options, quiet, quiet);
   std::vector<std::array<int, 3>> triangles;
   if (!failed) {
     facetT* facet;
@@ -72,8 +72,10 @@ std::vector<std::array<int, 3>> hull_triangles(const std::vector<Vec3>& points) 
   return triangles;
 }
 
-// Nearest point to the origin of the simplex with `count` corners y, and which corners it needs (weights > 0):
-// over all faces, the nearest point of the face's plane if it lies in the face.
+}  // namespace
+
+// Nearest point to the origin of the simplex with `count` corners y, and which corners it needs (weights >
+// 0): over all faces, the nearest point of the face's plane if it lies in the face.
 Vec3 nearest_on_simplex(Vec3 (&y)[4], int& count) {
   double best = 1e300;
   Vec3 nearest = y[0];
@@ -111,8 +113,6 @@ Vec3 nearest_on_simplex(Vec3 (&y)[4], int& count) {
   count = n;
   return nearest;
 }
-
-}  // namespace
 
 ConvexHull::ConvexHull(const std::vector<Vec3>& points) {
   if (is_flat(points)) throw ShapeError("the points lie in a plane: their convex hull has no inside");

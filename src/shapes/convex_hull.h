@@ -9,6 +9,9 @@
 
 namespace nurbs {
 
+// Nearest point to the origin of the simplex with `count` corners y; leaves in y those that it is a mean of.
+Vec3 nearest_on_simplex(Vec3 (&y)[4], int& count);
+
 class ConvexHull {
  public:
   // Of finite points. Throws ShapeError when they lie in a plane, to within 1e-9 of their extent.

@@ -17,8 +17,9 @@ namespace nurbs {
 namespace {
 
 // Degree and spans of the bodies tried, by number of control points.
-constexpr int kLadder[][2] = {{3, 1}, {4, 1}, {3, 2}, {4, 2}, {3, 3}, {4, 3}, {3, 4}, {4, 4}, {3, 6}, {4, 6}, {3, 8}};
-constexpr double kCurvatureShare = 3;   // least curvature over the tolerance, both relative
+constexpr int kLadder[][2] = {{3, 1}, {4, 1}, {3, 2}, {4, 2}, {3, 3}, {4, 3},
+                              {3, 4}, {4, 4}, {3, 6}, {4, 6}, {3, 8}};
+constexpr double kCurvatureShare = 3;  // least curvature over the tolerance, both relative
 constexpr double kLeastCurvature = 0.002, kMostCurvature = 0.1;
 constexpr double kSurelyTooCoarse = 3;  // times the tolerance: the next rung is skipped
 constexpr int kClosestSteps = 40;
@@ -26,6 +27,24 @@ constexpr double kClosestStride = 0.3;  // parameters
 constexpr int kMostPieces = 200000;
 
 // --- certificates
+
+// Upper bound of the distance from a point to the body by Gilbert's, Johnson's and Keerthi's algorithm:
+// slower than Newton's method, but it always closes in.
+double distance_by_supports(const Shape& shape, const Vec3& v, double enough) {
+  Vec3 simplex[4] = {find_support(shape, v.normalized()).point - v};
+  int count = 1;
+  Vec3 nearest = simplex[0];
+  for (int k = 0; k < kClosestSteps; ++k) {
+    const double far = nearest.norm();
+    if (far <= enough || far <= 1e-12 * shape.bounding_radius) return far;
+    const Vec3 y = find_support(shape, -nearest / far).point - v;
+    if (far * far - nearest.dot(y) <= 1e-9 * shape.bounding_radius * far) return far;
+    simplex[count++] = y;
+    nearest = nearest_on_simplex(simplex, count);
+    if (count == 4) return 0;
+  }
+  return nearest.norm();
+}
 
 // Upper bound of the distance from a point to the body, 0 where it is inside: Newton's method for the closest
 // surface point. A foot point from which the point is seen along the inward normal, nearer than the body's
@@ -50,13 +69,13 @@ double distance_to_body(const Shape& shape, const Vec3& v, double enough) {
     if (step.norm() > kClosestStride) step *= kClosestStride / step.norm();
     at = walk(shape, at, step[0], step[1]);
   }
-  return best;
+  return std::min(best, distance_by_supports(shape, v, enough));
 }
 
 struct Piece {
   BezierPatch patch;
-  double bound;   // of its distance to the hull
-  int vertex;     // of the hull, near it
+  double bound;  // of its distance to the hull
+  int vertex;    // of the hull, near it
   bool operator<(const Piece& other) const { return bound < other.bound; }
 };
 
@@ -72,7 +91,9 @@ std::pair<BezierPatch, BezierPatch> halve(const BezierPatch& patch, bool in_u) {
   std::pair<BezierPatch, BezierPatch> out{patch, patch};
   const int n = in_u ? patch.degree_u : patch.degree_v, lines = in_u ? patch.degree_v : patch.degree_u;
   for (int line = 0; line <= lines; ++line) {
-    const auto at = [&](BezierPatch& p, int k) -> Vec4& { return in_u ? p.point(k, line) : p.point(line, k); };
+    const auto at = [&](BezierPatch& p, int k) -> Vec4& {
+      return in_u ? p.point(k, line) : p.point(line, k);
+    };
     for (int i = 0; i <= n; ++i) {
       at(out.second, n - i) = at(out.first, n);
       for (int k = n; k > i; --k) at(out.first, k) = 0.5 * (at(out.first, k) + at(out.first, k - 1));
@@ -130,8 +151,8 @@ double bounding_radius(const ConvexHull& hull, const Vec3& center) {
   return radius;
 }
 
-// Signed distance from the hull along the facet that a point's ray meets: the ray's facet is the support point
-// of the polar hull, whose vertices are n / h of the facets.
+// Signed distance from the hull along the facet that a point's ray meets: the ray's facet is the support
+// point of the polar hull, whose vertices are n / h of the facets.
 class RayTarget {
  public:
   explicit RayTarget(const ConvexHull& hull) : polar_(polar_points(hull)) {}
@@ -159,7 +180,8 @@ class RayTarget {
 };
 
 Vec3 ray(int face, double u, double v) {
-  return cube_direction(face, std::tan((2 * u - 1) * M_PI / 4), std::tan((2 * v - 1) * M_PI / 4)).normalized();
+  return cube_direction(face, std::tan((2 * u - 1) * M_PI / 4), std::tan((2 * v - 1) * M_PI / 4))
+      .normalized();
 }
 
 std::string percent(double x) {
@@ -219,7 +241,8 @@ class HullFitter {
     };
     ConvexFitOptions options;
     options.tolerance = 0.97 * tolerance_;
-    options.least_curvature = std::clamp(kCurvatureShare * options_.tolerance, kLeastCurvature, kMostCurvature);
+    options.least_curvature =
+        std::clamp(kCurvatureShare * options_.tolerance, kLeastCurvature, kMostCurvature);
     options.most_curvature = 1 / options_.tolerance;
     options.metric = frame_.to.transpose();
     const OffsetTarget offset = [&](const Vec3& x, const Vec3&, int& hint) { return target(x, hint); };
@@ -229,9 +252,9 @@ class HullFitter {
       start_ = cube.surfaces(fit.points);
     }
     last_error_ = fit.error / radius_;
-    const std::string kind = std::string(degree == 3 ? "bicubic" : "biquartic") + ", " + std::to_string(spans) +
-                             " x " + std::to_string(spans) + " spans, " + std::to_string(cube.count()) +
-                             " control points";
+    const std::string kind = std::string(degree == 3 ? "bicubic" : "biquartic") + ", " +
+                             std::to_string(spans) + " x " + std::to_string(spans) + " spans, " +
+                             std::to_string(cube.count()) + " control points";
     if (fit.error > 1.5 * tolerance_) {
       say(kind + (fit.error < 1e300 ? ": off by about " + percent(last_error_) : ": not convex"));
       if (fit.error < 1e300) least_ = std::min(least_, last_error_);

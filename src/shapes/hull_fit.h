@@ -24,8 +24,8 @@ struct HullDistance {
 HullDistance hull_distance(const Shape& shape, const ConvexHull& hull, double resolution);
 
 struct HullFitOptions {
-  double tolerance = 0.01;  // of the hull's bounding radius about its centre of mass
-  int spans = 0;            // per patch and direction, 0: as few as do
+  double tolerance = 0.01;                           // of the hull's bounding radius about its centre of mass
+  int spans = 0;                                     // per patch and direction, 0: as few as do
   std::function<void(const std::string&)> progress;  // told what was tried, a line at a time
 };
 

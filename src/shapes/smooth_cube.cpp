@@ -101,8 +101,7 @@ Eigen::SparseMatrix<double> SmoothCube::joint_conditions() const {
         }
         double length = 0;
         for (const auto& [column, value] : row) length += value * value;
-        for (const auto& [column, value] : row)
-          entries.emplace_back(rows, column, value / std::sqrt(length));
+        for (const auto& [column, value] : row) entries.emplace_back(rows, column, value / std::sqrt(length));
         ++rows;
       }
     }

@@ -86,14 +86,14 @@ TriangleMesh weld(const TriangleMesh& mesh, double tolerance) {
     int found = -1;
     for (int corner = 0; corner < 8 && found < 0; ++corner) {
       const auto it = cells.find({low[0] + (corner & 1), low[1] + (corner >> 1 & 1), low[2] + (corner >> 2)});
-      if (it != cells.end() && (out.points[it->second] - mesh.points[k]).norm() <= tolerance) found = it->second;
+      if (it != cells.end() && (out.points[it->second] - mesh.points[k]).norm() <= tolerance)
+        found = it->second;
     }
     if (found < 0) {
       found = static_cast<int>(out.points.size());
       out.points.push_back(mesh.points[k]);
       std::array<std::int64_t, 3> own{};
-      for (int c = 0; c < 3; ++c)
-        own[c] = static_cast<std::int64_t>(std::floor(mesh.points[k][c] * inverse));
+      for (int c = 0; c < 3; ++c) own[c] = static_cast<std::int64_t>(std::floor(mesh.points[k][c] * inverse));
       cells.emplace(own, found);
     }
     place[k] = found;
@@ -199,7 +199,8 @@ MeshDefects orient(TriangleMesh& mesh) {
     const Vec3 from = mesh.points[mesh.triangles[seed][0]];
     for (int t : sheet) {
       const auto& c = mesh.triangles[t];
-      volume += side[t] * (mesh.points[c[0]] - from).dot((mesh.points[c[1]] - from).cross(mesh.points[c[2]] - from));
+      volume += side[t] *
+                (mesh.points[c[0]] - from).dot((mesh.points[c[1]] - from).cross(mesh.points[c[2]] - from));
     }
     if (volume < 0)
       for (int t : sheet) side[t] = static_cast<signed char>(-side[t]);

@@ -24,9 +24,9 @@ std::vector<TriangleMesh> split_pieces(const TriangleMesh& mesh);
 
 // How a piece fails to bound a solid.
 struct MeshDefects {
-  int open_edges = 0;    // with one triangle
-  int wild_edges = 0;    // with more than two
-  int turned = 0;        // triangles whose winding disagreed and was turned
+  int open_edges = 0;  // with one triangle
+  int wild_edges = 0;  // with more than two
+  int turned = 0;      // triangles whose winding disagreed and was turned
   bool one_sided = false;
   Vec3 where = Vec3::Zero();  // the middle of an open edge
 };

@@ -1,18 +1,14 @@
 // nurbs-shape: makes, describes and checks shape files.
-#include <unistd.h>
-
 #include <CLI/CLI.hpp>
 #include <algorithm>
-#include <cerrno>
+#include <array>
 #include <charconv>
 #include <cmath>
 #include <cstdio>
-#include <cstring>
 #include <exception>
-#include <fstream>
+#include <filesystem>
 #include <map>
 #include <memory>
-#include <stdexcept>
 #include <string>
 #include <vector>
 
@@ -20,6 +16,9 @@
 #include "io/shape_file.h"
 #include "nurbs/affine.h"
 #include "shapes/primitives.h"
+#include "shapes/random_pebble.h"
+#include "shapes/revolved.h"
+#include "tools/command.h"
 
 namespace {
 
@@ -31,6 +30,7 @@ constexpr char kExamples[] =
     "  nurbs-shape make ellipsoid --axes 0.012,0.008,0.006 -o ellipsoid.json\n"
     "  nurbs-shape make superellipsoid --axes 1,1,2 --exponent 4 --spans 5 blocky.json\n"
     "  nurbs-shape make inertia --inertia 1.0,0.9,0.8,-0.04,0.02,0.09 --mass 2 stone.json\n"
+    "  nurbs-shape fit grain.stl --tolerance 2% -o grain.json\n"
     "  nurbs-shape info ellipsoid.json\n"
     "  nurbs-shape check ellipsoid.json\n";
 
@@ -39,30 +39,6 @@ constexpr char kInertiaNotes[] =
     "follows and\n"
     "is printed; with --density the mass follows; with both the mass is met and the density must agree to "
     "0.1 %.";
-
-struct UsageError : std::runtime_error {
-  using std::runtime_error::runtime_error;
-};
-
-// Help that begins with how a command is called.
-class Help : public CLI::Formatter {
- public:
-  explicit Help(const std::string& usage) : usage_(usage) { column_width(26); }
-  std::string make_description(const CLI::App*) const override { return ""; }
-  std::string make_positionals(const CLI::App*) const override { return ""; }  // the usage names them
-  std::string make_usage(const CLI::App* app, std::string) const override {
-    return "usage: " + usage_ + "\n\n" + app->get_description() + "\n";
-  }
-
- private:
-  std::string usage_;
-};
-
-std::string format(const char* pattern, double value) {
-  char text[64];
-  std::snprintf(text, sizeof text, pattern, value);
-  return text;
-}
 
 // --- Options
 // -------------------------------------------------------------------------------------------------
@@ -117,6 +93,13 @@ class Options {
            " separated by commas");
     }
     return out;
+  }
+
+  // One or more numbers.
+  std::vector<double> numbers_up_to(const std::string& name, size_t most, double lo, double hi) const {
+    const std::string& text = command_->get_option(name)->results()[0];
+    const size_t count = static_cast<size_t>(std::count(text.begin(), text.end(), ',')) + 1;
+    return numbers(name, std::min(count, most), lo, hi);
   }
 
   double number(const std::string& name, double otherwise, double lo, double hi) const {
@@ -253,10 +236,76 @@ Body make_superellipsoid(const Options& options) {
   return {std::move(surfaces), fit_note(error)};
 }
 
+// A share in [lo, 1], or a range of them "LO,HI".
+std::array<double, 2> range(const Options& options, const std::string& name, double otherwise, double lo) {
+  if (!options.has(name)) return {otherwise, otherwise};
+  const std::vector<double> x = options.numbers_up_to(name, 2, lo, 1);
+  if (x.front() > x.back())
+    options.fail(name + " runs from " + format("%g", x.front()) + " down to " + format("%g", x.back()));
+  return {x.front(), x.back()};
+}
+
+std::uint64_t whole(const Options& options, const std::string& name, double otherwise, double lo, double hi) {
+  const double n = options.number(name, otherwise, lo, hi);
+  if (n != std::floor(n)) options.fail(name + " must be a whole number");
+  return static_cast<std::uint64_t>(n);
+}
+
+constexpr double kMostSeed = 9e15;
+
 Body make_pebble(const Options& options) {
+  const double radius = options.positive("--radius", 1);
+  if (options.has("--seed")) {
+    PebbleForm form;
+    form.radius = radius;
+    form.roundness = options.number("--roundness", form.roundness, 0, 1);
+    form.elongation = options.number("--elongation", form.elongation, 0.2, 1);
+    form.flatness = options.number("--flatness", form.flatness, 0.2, 1);
+    return {random_pebble(whole(options, "--seed", 1, 0, kMostSeed), form), ""};
+  }
+  for (const char* name : {"--roundness", "--elongation", "--flatness"})
+    if (options.has(name)) options.fail(std::string(name) + " is for random pebbles: add --seed");
   Surfaces surfaces = pebble();
-  transform(surfaces, options.positive("--radius", 1) * Mat3::Identity(), Vec3::Zero());
+  transform(surfaces, radius * Mat3::Identity(), Vec3::Zero());
   return {std::move(surfaces), ""};
+}
+
+// The surfaces turned outward, as the loader turns them.
+Body outward(Surfaces surfaces) {
+  return {make_shape("", std::move(surfaces))->surfaces, ""};
+}
+
+Body make_capsule(const Options& options) {
+  const double radius = options.positive("--radius");
+  return {capsule(radius, options.positive("--length")), ""};
+}
+
+Body make_tablet(const Options& options) {
+  const double radius = options.positive("--radius"), height = options.positive("--height"),
+               rim = options.positive("--rim");
+  if (!options.has("--cap")) return {tablet(radius, height, rim), ""};
+  return {biconvex_tablet(radius, options.number("--height", 0, 0, Options::kMost), options.positive("--cap"),
+                          rim),
+          ""};
+}
+
+Body make_lens(const Options& options) {
+  const double radius = options.positive("--radius"), cap = options.positive("--cap");
+  return {lens(radius, cap, options.positive("--rim")), ""};
+}
+
+Body make_egg(const Options& options) {
+  const double radius = options.positive("--radius"), blunt = options.positive("--blunt");
+  return {egg(radius, blunt, options.positive("--pointed")), ""};
+}
+
+Body make_rounded_box(const Options& options) {
+  const Vec3 axes = options.axes();
+  const double rounding = options.positive("--rounding");
+  if (rounding > axes.minCoeff())
+    options.fail("--rounding is " + format("%g", rounding) + ", must be at most the least half edge, " +
+                 format("%g", axes.minCoeff()));
+  return outward(rounded_box(axes, rounding));
 }
 
 Body make_inertia(const Options& options) {
@@ -294,12 +343,44 @@ struct Maker {
 const std::vector<Maker>& makers() {
   static const Argument kRadius{"--radius", "R", "default 1"}, kAxes{"--axes", "A,B,C", "semi-axes"},
       kSpans{"--spans", "N", "of a patch in each direction, 1 to 12, default 1: more fit better"};
+  static const Argument kOuter{"--radius", "R", "of the body, across its axis"},
+      kRim{"--rim", "R", "radius of the rim's rounding"};
   static const std::vector<Maker> kMakers = {
       {"sphere", "exact, six biquartic rational patches", {kRadius}, make_sphere},
       {"ellipsoid", "exact, six biquartic rational patches", {kAxes}, make_ellipsoid},
       {"fitted-ellipsoid", "six bicubic patches, joints nearly smooth", {kAxes, kSpans}, make_fitted},
       {"smooth-ellipsoid", "six bicubic patches, joints smooth", {kAxes}, make_smooth},
-      {"pebble", "asymmetric, six bicubic patches, joints smooth", {kRadius}, make_pebble},
+      {"pebble",
+       "asymmetric, six bicubic patches, joints smooth; with --seed a random one",
+       {kRadius,
+        {"--seed", "N", "whole number: its own pebble for each; --radius is that of the same volume"},
+        {"--roundness", "R", "0 to 1, default 0.5: 1 is an ellipsoid, less more angular"},
+        {"--elongation", "E", "second over first axis, 0.2 to 1, default 0.8"},
+        {"--flatness", "F", "third over second axis, 0.2 to 1, default 0.7"}},
+       make_pebble},
+      {"capsule",
+       "exact: cylinder with half spheres, axis z",
+       {kOuter, {"--length", "L", "of the cylinder"}},
+       make_capsule},
+      {"tablet",
+       "exact: cylinder with rounded rims, axis z; with --cap biconvex",
+       {kOuter,
+        {"--height", "H", "of the whole; with --cap: of the band"},
+        kRim,
+        {"--cap", "C", "radius of the spherical caps"}},
+       make_tablet},
+      {"lens",
+       "exact: two spherical caps with a rounded rim, axis z",
+       {kOuter, {"--cap", "C", "radius of the caps"}, kRim},
+       make_lens},
+      {"egg",
+       "exact: halves of two ellipsoids of revolution, axis z",
+       {kOuter, {"--blunt", "A", "height of the blunt half"}, {"--pointed", "B", "of the other"}},
+       make_egg},
+      {"rounded-box",
+       "exact: flat faces, edges of cylinders, corners of spheres",
+       {{"--axes", "A,B,C", "half edges"}, {"--rounding", "R", "radius of edges and corners"}},
+       make_rounded_box},
       {"superellipsoid",
        "|x/A|^E + |y/B|^E + |z/C|^E = 1, fitted",
        {kAxes,
@@ -323,21 +404,55 @@ const std::vector<Maker>& makers() {
   return kMakers;
 }
 
-// Writes beside `file` and renames, so that `file` is whole or untouched.
-void write_whole(const std::string& file, const std::string& text) {
-  const std::string draft = file + "." + std::to_string(getpid()) + ".tmp";
-  std::ofstream out(draft, std::ios::binary);
-  out << text;
-  out.close();
-  if (!out || std::rename(draft.c_str(), file.c_str()) != 0) {
-    const std::string reason = std::strerror(errno);
-    std::remove(draft.c_str());
-    throw std::runtime_error("can't write " + file + ": " + reason);
-  }
-}
+// Many random pebbles, and a deck that inserts them.
+const std::vector<Argument> kPebblesOptions = {
+    {"--count", "N", "1 to 100000"},
+    {"--seed", "N", "whole number, default 1"},
+    {"--radius", "R", "of the sphere of the same volume, default 1"},
+    {"--roundness", "LO,HI", "drawn from this range, or one number; default 0.3,0.8"},
+    {"--elongation", "LO,HI", "default 0.6,1"},
+    {"--flatness", "LO,HI", "default 0.5,1"}};
+constexpr char kPebblesNotes[] =
+    "Writes FILE-1.json .. FILE-N.json and FILE.deck, whose lines (atom_style, particletemplate, a "
+    "distribution of equal\n"
+    "shares) go into a deck; a .json at the end of FILE is left out.";
 
-void print_warnings(const std::vector<std::string>& warnings) {
-  for (const std::string& warning : warnings) std::fprintf(stderr, "WARNING: %s\n", warning.c_str());
+void make_pebbles(const Options& options) {
+  options.check();
+  std::string stem = options.output();
+  if (stem.size() > 5 && stem.substr(stem.size() - 5) == ".json") stem.resize(stem.size() - 5);
+  const std::string name = std::filesystem::path(stem).filename().string();
+  options.numbers("--count", 1, 1, 100000);
+  const std::uint64_t count = whole(options, "--count", 1, 1, 100000),
+                      seed = whole(options, "--seed", 1, 0, kMostSeed);
+  const double radius = options.positive("--radius", 1);
+  const auto both = [](double lo, double hi) { return std::array{lo, hi}; };
+  const auto roundness = options.has("--roundness") ? range(options, "--roundness", 0, 0) : both(0.3, 0.8);
+  const auto elongation = options.has("--elongation") ? range(options, "--elongation", 0, 0.2) : both(0.6, 1);
+  const auto flatness = options.has("--flatness") ? range(options, "--flatness", 0, 0.2) : both(0.5, 1);
+  std::vector<std::string> files;
+  std::string style = "atom_style nurbs", templates, distribution;
+  for (std::uint64_t k = 0; k < count; ++k) {
+    const auto draw = [&](const std::array<double, 2>& r, double step) {  // a lattice of low discrepancy
+      return r[0] + (r[1] - r[0]) * std::fmod(0.5 + step * static_cast<double>(k + 1 + seed % 100003), 1.0);
+    };
+    const PebbleForm form{draw(roundness, 0.8191725133961645), draw(elongation, 0.6710436067037893),
+                          draw(flatness, 0.5497004779019703), radius};
+    files.push_back(write_shape({random_pebble(seed * 1000003 + k, form), std::nullopt}));
+    const std::string number = std::to_string(k + 1);
+    style += " &\n  " + name + "-" + number + ".json";
+    templates += "fix " + name + "-" + number + " all particletemplate/nurbs " +
+                 std::to_string(100003 + 2 * k) + " atom_type 1 density constant 2500 shape " + name + "-" +
+                 number + " scale constant 1\n";
+    distribution += " &\n  " + name + "-" + number + " " + format("%.9g", 1 / static_cast<double>(count));
+  }
+  for (std::uint64_t k = 0; k < count; ++k)
+    write_whole(stem + "-" + std::to_string(k + 1) + ".json", files[k]);
+  write_whole(stem + ".deck", style + "\n\n" + templates + "fix " + name +
+                                  " all particledistribution/discrete 15485863 " + std::to_string(count) +
+                                  distribution + "\n");
+  std::printf("%s-1.json to %s-%llu.json, %s.deck\n", stem.c_str(), stem.c_str(),
+              static_cast<unsigned long long>(count), stem.c_str());
 }
 
 void make(const Maker& maker, const Options& options) {
@@ -454,6 +569,11 @@ CLI::App* add_make(CLI::App& app, std::vector<Options>& options) {
     kind->footer(maker.notes);
     options.emplace_back(kind, maker.options);
   }
+  CLI::App* pebbles =
+      command->add_subcommand("pebbles", "many random pebbles, as one distribution for a deck");
+  pebbles->formatter(std::make_shared<Help>("nurbs-shape make pebbles --count N [options] -o FILE"));
+  pebbles->footer(kPebblesNotes);
+  options.emplace_back(pebbles, kPebblesOptions);
   return command;
 }
 
@@ -472,13 +592,18 @@ void run(CLI::App& app, int argc, char** argv) {
   const CLI::App* describer = add_reader("info", "describes a shape");
   const CLI::App* checker =
       add_reader("check", "exits with 0 if the file is a usable shape, 1 with the reason if not");
+  const Command commands[] = {add_fit(app), add_simplify(app)};
   app.parse(argc, argv);
+
+  for (const Command& command : commands)
+    if (command.parser->parsed()) return command.run();
 
   if (describer->parsed()) return info(file);
   if (checker->parsed()) return check(file);
   if (!maker->parsed()) throw UsageError("no command; see nurbs-shape --help");
-  for (size_t k = 0; k < options.size(); ++k)
+  for (size_t k = 0; k < makers().size(); ++k)
     if (maker->got_subcommand(makers()[k].kind)) return make(makers()[k], options[k]);
+  if (maker->got_subcommand("pebbles")) return make_pebbles(options.back());
   const std::vector<std::string> left = maker->remaining();
   throw UsageError("make: " + (left.empty() ? "no kind" : "unknown kind '" + left[0] + "'") +
                    "; see nurbs-shape make --help");

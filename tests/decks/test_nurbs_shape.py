@@ -1,6 +1,7 @@
 #!/usr/bin/python3
 """nurbs-shape: every kind of body makes a file that passes the check; bad input gives one clear line and no file."""
 import json
+import math
 import pathlib
 import re
 import subprocess
@@ -16,6 +17,20 @@ KINDS = [["sphere", "--radius", "2"], ["ellipsoid", "--axes", "1,2,3"], ["fitted
          ["superellipsoid", "--axes", "1,1,2", "--exponent", "4"], ["revolved", "--equatorial", "2", "--polar", "1"],
          ["box", "--axes=1,2,3"], ["inertia", "--mass", "2", "--inertia", INERTIA],
          ["inertia", "--density", "0.5", "--inertia", INERTIA]]
+# Exact bodies: arguments, number of patches, volume, bounding radius.
+P = math.pi
+EXACT = [(["capsule", "--radius", "1", "--length", "2"], 3, 2 * P + 4 / 3 * P, 2),
+         (["tablet", "--radius", "1", "--height", "0.6", "--rim", "0.3"], 4,
+          0.6 * P * (0.49 + 0.35 * P * 0.3 + 2 / 3 * 0.09), None),  # disc, half torus about it
+         (["tablet", "--radius", "1", "--height", "0.8", "--rim", "0.2"], 5, None, None),
+         (["tablet", "--radius", "1", "--height", "0.4", "--cap", "1.6", "--rim", "0.1"], 5, None, None),
+         (["lens", "--radius", "1", "--cap", "1.5", "--rim", "0.1"], 4, None, 1),
+         (["egg", "--radius", "1", "--blunt", "1", "--pointed", "1.6"], 2, 2 / 3 * P * 2.6, None),
+         (["rounded-box", "--axes", "1,0.8,0.6", "--rounding", "0.2"], 26,
+          8 * 0.8 * 0.6 * 0.4 + 8 * 0.2 * (0.8 * 0.6 + 0.6 * 0.4 + 0.8 * 0.4) + P * 0.04 * 2 * 1.8 + 4 / 3 * P * 0.008,
+          math.sqrt(0.64 + 0.36 + 0.16) + 0.2),
+         (["rounded-box", "--axes", "1,1,1", "--rounding", "1"], 8, 4 / 3 * P, 1),
+         (["pebble", "--seed", "4", "--radius", "2"], 6, 32 / 3 * P, None)]
 # Arguments of `make`, and what the error must name.
 BAD = [(["cone"], "cone"),
        (["sphere", "--radius", "0"], "--radius is 0, must be > 0"),
@@ -37,6 +52,15 @@ BAD = [(["cone"], "cone"),
        (["ellipsoid", "--axes", "1,2,3,"], "'' is not a number"),
        (["fitted-ellipsoid", "--axes", "1,2,3", "--spans", "0"], "must be in 1..12"),
        (["fitted-ellipsoid", "--axes", "1,2,3", "--spans", "1.5"], "whole number"),
+       (["rounded-box", "--axes", "1,2,3", "--rounding", "1.5"], "must be at most the least half edge, 1"),
+       (["tablet", "--radius", "1", "--height", "1", "--rim", "0.6"], "at most half the height"),
+       (["lens", "--radius", "1", "--cap", "0.9", "--rim", "0.1"], "the cap's radius"),
+       (["capsule", "--radius", "1"], "--length is missing"),
+       (["pebble", "--roundness", "0.5"], "add --seed"),
+       (["pebble", "--seed", "1.5"], "whole number"),
+       (["pebble", "--seed", "1", "--flatness", "0.1"], "must be in 0.2..1"),
+       (["pebbles", "--count", "0"], "--count is 0"),
+       (["pebbles", "--count", "2", "--roundness", "0.8,0.2"], "down to"),
        (["superellipsoid", "--axes", "1,2,3"], "--exponent is missing"),
        (["superellipsoid", "--axes", "1,2,3", "--exponent", "1"], "must be in 2..12"),
        (["inertia", "--inertia", INERTIA], "--mass or --density is missing"),
@@ -72,6 +96,41 @@ class NurbsShape(unittest.TestCase):
                 check = call("check", str(self.file))
                 self.assertEqual(check.returncode, 0, check.stderr)
                 self.assertIn("usable", check.stdout)
+
+    def test_exact_bodies(self):
+        for kind, patches, volume, radius in EXACT:
+            with self.subTest(kind=kind):
+                made = call("make", *kind, "-o", str(self.file))
+                self.assertEqual((made.returncode, made.stderr), (0, ""))
+                self.assertEqual(len(json.loads(self.file.read_text())["shape"]["data"]), patches)
+                check = call("check", str(self.file))
+                self.assertEqual((check.returncode, check.stderr), (0, ""))
+                self.assertIn("closed, outward, convex", check.stdout)
+                info = call("info", str(self.file)).stdout
+                if volume:
+                    self.assertAlmostEqual(float(re.search(r"volume +(\S+)", info)[1]) / volume, 1, 10)
+                if radius:
+                    self.assertAlmostEqual(float(re.search(r"bounding radius +(\S+)", info)[1]) / radius, 1, 6)
+
+    def test_random_pebbles(self):
+        made = call("make", "pebbles", "--count", "50", "--seed", "7", "--elongation", "0.7", "--flatness", "0.5,0.6",
+                    "-o", str(self.place / "p"))
+        self.assertEqual(made.returncode, 0, made.stderr)
+        texts = set()
+        for k in range(1, 51):
+            file = self.place / f"p-{k}.json"
+            texts.add(file.read_text())
+            check = call("check", str(file))
+            self.assertEqual((check.returncode, check.stderr), (0, ""), file)
+            xx, yy, zz = map(float, re.search(r"xx (\S+) yy (\S+) zz (\S+)", call("info", str(file)).stdout).groups())
+            a, b, c = sorted((math.sqrt(yy + zz - xx), math.sqrt(xx + zz - yy), math.sqrt(xx + yy - zz)), reverse=True)
+            self.assertAlmostEqual(b / a, 0.7, 6)
+            self.assertTrue(0.5 - 1e-6 < c / b < 0.6 + 1e-6)
+        self.assertEqual(len(texts), 50)
+        again = call("make", "pebbles", "--count", "1", "--seed", "7", "--elongation", "0.7", "--flatness", "0.5,0.6",
+                     "-o", str(self.file))
+        self.assertEqual(again.returncode, 0, again.stderr)
+        self.assertIn((self.place / "shape-1.json").read_text(), texts)
 
     def test_info_names_mass_and_inertia(self):
         self.assertEqual(call("make", "sphere", "--radius", "2", "-o", str(self.file)).returncode, 0)

@@ -1,0 +1,187 @@
+// Profiles, their revolution, and rounded boxes.
+#include "shapes/revolved.h"
+
+#include <array>
+#include <cmath>
+
+#include "body/shape.h"
+
+namespace nurbs {
+namespace {
+
+ProfileArc line(const Vec2& from, const Vec2& to) {
+  return {from, 0.5 * (from + to), to, 0};
+}
+
+// Arc of a circle about `center` from the polar angle a to b (rad, b > a, less than a half turn).
+ProfileArc arc(const Vec2& center, double radius, double a, double b) {
+  const auto at = [&](double t) { return Vec2(center + radius * Vec2(std::cos(t), std::sin(t))); };
+  const double half = 0.5 * (b - a), middle = 0.5 * (a + b);
+  return {at(a), center + radius / std::cos(half) * Vec2(std::cos(middle), std::sin(middle)), at(b),
+          std::cos(half)};
+}
+
+// Full circle as four rational quadratics (NURBS Book, example 7.2).
+constexpr int kCircle[9][2] = {{1, 0}, {1, 1}, {0, 1}, {-1, 1}, {-1, 0}, {-1, -1}, {0, -1}, {1, -1}, {1, 0}};
+
+NurbsSurface revolve(const ProfileArc& a) {
+  NurbsSurface s;
+  s.degree_u = 2;
+  s.degree_v = a.weight > 0 ? 2 : 1;
+  s.knots_u = {0, 0, 0, 0.25, 0.25, 0.5, 0.5, 0.75, 0.75, 1, 1, 1};
+  s.knots_v = a.weight > 0 ? std::vector<double>{0, 0, 0, 1, 1, 1} : std::vector<double>{0, 0, 1, 1};
+  s.size_u = 9;
+  s.size_v = s.degree_v + 1;
+  const Vec2 point[3] = {a.from, a.weight > 0 ? a.corner : a.to, a.to};
+  const double weight[3] = {1, a.weight > 0 ? a.weight : 1, 1};
+  for (int i = 0; i < s.size_u; ++i)
+    for (int j = 0; j < s.size_v; ++j) {
+      const double w = weight[j] * (i % 2 ? std::sqrt(0.5) : 1);
+      s.points.push_back(w * Vec4(point[j][0] * kCircle[i][0], point[j][0] * kCircle[i][1], point[j][1], 1));
+    }
+  return s;
+}
+
+// The profile below the equator, given from the pole outward, and its mirror image.
+Profile mirrored(Profile lower) {
+  const auto flip = [](const Vec2& p) { return Vec2(p[0], -p[1]); };
+  for (int k = static_cast<int>(lower.size()) - 1; k >= 0; --k) {
+    const ProfileArc a = lower[k];
+    if (k == static_cast<int>(lower.size()) - 1 && a.weight == 0 && a.from[1] < 0 && a.to[1] > 0) continue;
+    lower.push_back({flip(a.to), flip(a.corner), flip(a.from), a.weight});
+  }
+  return lower;
+}
+
+// Cap of radius `cap` whose edge is rounded by `rim` up to the cylinder of `radius`, below a band.
+Profile cap_and_rim(double radius, double band, double cap, double rim) {
+  if (!(rim > 0 && rim < radius && rim < cap))
+    throw ShapeError("the rim's radius must be less than the other radii");
+  if (!(cap >= radius)) throw ShapeError("the cap's radius must be the body's radius at least");
+  // The rim's centre is on r = radius - rim, inside the cap's sphere by cap - rim.
+  const double reach = cap - rim, across = radius - rim, down = std::sqrt(reach * reach - across * across);
+  const Vec2 rim_center(across, -0.5 * band), cap_center(0, -0.5 * band + down);
+  const double joint = std::atan2(-down, across);  // polar angle of the common normal
+  return {arc(cap_center, cap, -M_PI / 2, joint), arc(rim_center, rim, joint, 0)};
+}
+
+// --- rounded box
+
+constexpr double kHalf = 0.70710678118654752;
+
+// Patch of degrees 1 or 2 from points and weights, v fastest.
+NurbsSurface patch(int p, int q, const std::vector<Vec3>& points, const std::vector<double>& weights) {
+  const auto knots = [](int degree) {
+    std::vector<double> k(degree + 1, 0.0);
+    k.insert(k.end(), degree + 1, 1.0);
+    return k;
+  };
+  NurbsSurface s;
+  s.degree_u = p;
+  s.degree_v = q;
+  s.knots_u = knots(p);
+  s.knots_v = knots(q);
+  s.size_u = p + 1;
+  s.size_v = q + 1;
+  for (size_t k = 0; k < points.size(); ++k) {
+    const Vec3 x = weights[k] * points[k];
+    s.points.emplace_back(x[0], x[1], x[2], weights[k]);
+  }
+  return s;
+}
+
+// A quarter cylinder between the faces of axes b and c (signs sb, sc), along axis a; a sphere's octant.
+NurbsSurface quarter_cylinder(const Vec3& core, double r, int a, int b, int c, int sb, int sc) {
+  std::vector<Vec3> points;
+  for (int end : {-1, 1})
+    for (const auto& [x, y] : {std::array{1, 0}, std::array{1, 1}, std::array{0, 1}}) {
+      Vec3 p;
+      p[a] = end * core[a];
+      p[b] = sb * (core[b] + r * x);
+      p[c] = sc * (core[c] + r * y);
+      points.push_back(p);
+    }
+  return patch(1, 2, points, {1, kHalf, 1, 1, kHalf, 1});
+}
+
+NurbsSurface octant(const Vec3& core, double r, const std::array<int, 3>& sign) {
+  std::vector<Vec3> points;
+  std::vector<double> weights;
+  constexpr int kQuarter[3][2] = {{1, 0}, {1, 1}, {0, 1}};
+  for (int i = 0; i < 3; ++i)
+    for (int j = 0; j < 3; ++j) {
+      const Vec3 p(r * kQuarter[i][0] * kQuarter[j][0], r * kQuarter[i][1] * kQuarter[j][0],
+                   r * kQuarter[j][1]);
+      points.emplace_back(sign[0] * (core[0] + p[0]), sign[1] * (core[1] + p[1]), sign[2] * (core[2] + p[2]));
+      weights.push_back((i == 1 ? kHalf : 1) * (j == 1 ? kHalf : 1));
+    }
+  return patch(2, 2, points, weights);
+}
+
+}  // namespace
+
+std::vector<NurbsSurface> revolve(const Profile& profile) {
+  std::vector<NurbsSurface> out;
+  for (const ProfileArc& a : profile) out.push_back(revolve(a));
+  return out;
+}
+
+std::vector<NurbsSurface> capsule(double radius, double length) {
+  const Vec2 low(0, -0.5 * length), high(0, 0.5 * length);
+  return revolve(Profile{arc(low, radius, -M_PI / 2, 0), line({radius, low[1]}, {radius, high[1]}),
+                         arc(high, radius, 0, M_PI / 2)});
+}
+
+std::vector<NurbsSurface> tablet(double radius, double height, double rim) {
+  if (!(rim > 0 && rim < radius && rim <= 0.5 * height))
+    throw ShapeError("the rim's radius must be less than the radius and at most half the height");
+  const double low = -0.5 * height, inner = radius - rim;
+  Profile lower{line({0, low}, {inner, low}), arc({inner, low + rim}, rim, -M_PI / 2, 0)};
+  if (rim < 0.5 * height) lower.push_back(line({radius, low + rim}, {radius, -low - rim}));
+  return revolve(mirrored(lower));
+}
+
+std::vector<NurbsSurface> biconvex_tablet(double radius, double band, double cap, double rim) {
+  Profile lower = cap_and_rim(radius, band, cap, rim);
+  if (band > 0) lower.push_back(line({radius, -0.5 * band}, {radius, 0.5 * band}));
+  return revolve(mirrored(lower));
+}
+
+std::vector<NurbsSurface> lens(double radius, double cap, double rim) {
+  return biconvex_tablet(radius, 0, cap, rim);
+}
+
+std::vector<NurbsSurface> egg(double radius, double blunt, double pointed) {
+  return revolve(Profile{{{0, -blunt}, {radius, -blunt}, {radius, 0}, kHalf},
+                         {{radius, 0}, {radius, pointed}, {0, pointed}, kHalf}});
+}
+
+std::vector<NurbsSurface> rounded_box(const Vec3& half_extents, double radius) {
+  const Vec3 core = half_extents - Vec3::Constant(radius);
+  std::vector<NurbsSurface> out;
+  for (int a = 0; a < 3; ++a) {
+    const int b = (a + 1) % 3, c = (a + 2) % 3;
+    for (int side : {-1, 1}) {
+      if (core[b] > 0 && core[c] > 0) {
+        std::vector<Vec3> points;
+        for (int i : {-1, 1})
+          for (int j : {-1, 1}) {
+            Vec3 p;
+            p[a] = side * half_extents[a];
+            p[b] = side * i * core[b];
+            p[c] = j * core[c];
+            points.push_back(p);
+          }
+        out.push_back(patch(1, 1, points, {1, 1, 1, 1}));
+      }
+    }
+    for (int sb : {-1, 1})
+      for (int sc : {-1, 1})
+        if (core[a] > 0) out.push_back(quarter_cylinder(core, radius, a, b, c, sb, sc));
+  }
+  for (int k = 0; k < 8; ++k)
+    out.push_back(octant(core, radius, {k & 1 ? 1 : -1, k & 2 ? 1 : -1, k & 4 ? 1 : -1}));
+  return out;
+}
+
+}  // namespace nurbs

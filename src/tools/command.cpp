@@ -1,0 +1,49 @@
+// Files, words and warnings of the sub-commands.
+#include "tools/command.h"
+
+#include <unistd.h>
+
+#include <cerrno>
+#include <charconv>
+#include <cstdio>
+#include <cstring>
+#include <fstream>
+
+namespace nurbs {
+
+std::string format(const char* pattern, double value) {
+  char text[64];
+  std::snprintf(text, sizeof text, pattern, value);
+  return text;
+}
+
+void write_whole(const std::string& file, const std::string& text) {
+  const std::string draft = file + "." + std::to_string(getpid()) + ".tmp";
+  std::ofstream out(draft, std::ios::binary);
+  out << text;
+  out.close();
+  if (!out || std::rename(draft.c_str(), file.c_str()) != 0) {
+    const std::string reason = std::strerror(errno);
+    std::remove(draft.c_str());
+    throw std::runtime_error("can't write " + file + ": " + reason);
+  }
+}
+
+void print_warnings(const std::vector<std::string>& warnings) {
+  for (const std::string& warning : warnings) std::fprintf(stderr, "WARNING: %s\n", warning.c_str());
+}
+
+double parse_share(const std::string& option, const std::string& text, double most) {
+  double value = 0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+  std::string rest(end, text.data() + text.size());
+  while (!rest.empty() && rest[0] == ' ') rest.erase(0, 1);
+  if (error != std::errc() || (!rest.empty() && rest != "%"))
+    throw UsageError(option + " '" + text + "' is not a share, as 1% or 0.01");
+  if (rest == "%") value /= 100;
+  if (!(value > 0 && value <= most))
+    throw UsageError(option + " is " + text + ", must be > 0 and at most " + format("%g", 100 * most) + "%");
+  return value;
+}
+
+}  // namespace nurbs

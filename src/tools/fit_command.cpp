@@ -1,0 +1,271 @@
+// nurbs-shape fit, simplify: smooth convex bodies for meshes and for shapes finer than needed.
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <memory>
+
+#include "body/mass_properties.h"
+#include "io/mesh_file.h"
+#include "io/shape_file.h"
+#include "nurbs/affine.h"
+#include "shapes/hull_fit.h"
+#include "tools/command.h"
+
+namespace nurbs {
+namespace {
+
+constexpr double kLeastTolerance = 2e-4, kMostTolerance = 0.5;
+constexpr double kWeld = 1e-7;  // of the extent: points closer are one
+constexpr int kSpansAtMost = 8;
+constexpr int kSampleGrid =
+    64;  // per patch parameter of a body to simplify, over all Bezier patches of a side
+
+struct FitArguments {
+  std::string file, output, tolerance = "1%", patches, keep, piece;
+};
+
+double extent(const TriangleMesh& mesh) {
+  Eigen::AlignedBox3d box;
+  for (const Vec3& p : mesh.points) box.extend(p);
+  return box.diagonal().norm();
+}
+
+std::string piece_list(const std::vector<TriangleMesh>& pieces) {
+  std::string list;
+  for (size_t k = 0; k < pieces.size() && k < 6; ++k)
+    list += (k ? ", " : "") + std::to_string(k + 1) + ": " + std::to_string(pieces[k].triangles.size()) +
+            " triangles, " + format("%.4g", extent(pieces[k])) + " across";
+  return list + (pieces.size() > 6 ? ", .." : "");
+}
+
+size_t chosen_piece(const FitArguments& a, const std::vector<TriangleMesh>& pieces) {
+  if (pieces.size() == 1) {
+    if (!a.piece.empty() && a.piece != "largest" && a.piece != "1")
+      throw UsageError("fit: --piece is " + a.piece + ", but " + a.file + " has one piece");
+    return 0;
+  }
+  if (a.piece == "largest") return 0;
+  for (size_t k = 0; k < pieces.size(); ++k)
+    if (a.piece == std::to_string(k + 1)) return k;
+  const std::string count = std::to_string(pieces.size());
+  if (!a.piece.empty()) throw UsageError("fit: --piece is " + a.piece + ", must be largest or 1 to " + count);
+  throw ShapeError(a.file + ": has " + count + " pieces (" + piece_list(pieces) +
+                   "): choose with --piece largest or a number");
+}
+
+// One closed piece, wound outward.
+TriangleMesh load_piece(const FitArguments& a) {
+  const TriangleMesh raw = read_mesh_file(a.file);
+  const double size = extent(raw);
+  if (!(size > 0)) throw ShapeError(a.file + ": all points coincide");
+  const std::vector<TriangleMesh> pieces = split_pieces(weld(raw, kWeld * size));
+  if (pieces.empty()) throw ShapeError(a.file + ": no triangle has an area");
+  TriangleMesh mesh = pieces[chosen_piece(a, pieces)];
+  const MeshDefects defects = orient(mesh);
+  std::printf("%s: %zu triangles, %zu points", a.file.c_str(), raw.triangles.size(), raw.points.size());
+  if (mesh.points.size() < raw.points.size()) std::printf(", %zu after welding", mesh.points.size());
+  if (pieces.size() > 1) std::printf(", piece of %zu", pieces.size());
+  if (defects.turned > 0) std::printf(", %d triangles wound the other way and turned", defects.turned);
+  std::printf("\n");
+  if (defects.open_edges > 0)
+    throw ShapeError(a.file + ": is open: " + std::to_string(defects.open_edges) +
+                     " edges have one triangle, one near " + format("%.4g ", defects.where[0]) +
+                     format("%.4g ", defects.where[1]) + format("%.4g", defects.where[2]) +
+                     "; close the mesh first");
+  if (defects.wild_edges > 0)
+    throw ShapeError(a.file + ": " + std::to_string(defects.wild_edges) +
+                     " edges have more than two triangles: the mesh bounds no solid");
+  if (defects.one_sided) throw ShapeError(a.file + ": the mesh is one-sided and has no inside");
+  return mesh;
+}
+
+int spans_of(const std::string& patches) {
+  if (patches.empty()) return 0;
+  for (int spans : {1, 2, 3, 4, 6, 8})
+    if (patches == std::to_string(6 * spans * spans)) return spans;
+  throw UsageError("--patches is " + patches + ", must be 6, 24, 54, 96, 216 or 384");
+}
+
+double worst_kink(const Shape& shape) {
+  double worst = 0;
+  for (const auto& edges : shape.links)
+    for (const EdgeLink& link : edges) worst = std::max(worst, std::abs(link.kink));
+  return worst * 180 / M_PI;
+}
+
+// Largest relative difference of the principal moments per mass.
+double moment_error(const MassProperties& a, const MassProperties& b) {
+  const Mat3 ga = a.inertia / a.volume, gb = b.inertia / b.volume;
+  return (ga - gb).norm() / gb.norm();
+}
+
+void print_differences(const char* to, const MassProperties& fit, const MassProperties& reference,
+                       double radius) {
+  std::printf("against %s: volume %+.3g %%, centre off by %.3g %% of the radius, inertia / mass by %.3g %%\n",
+              to, 100 * (fit.volume / reference.volume - 1),
+              100 * (fit.center - reference.center).norm() / radius, 100 * moment_error(fit, reference));
+}
+
+HullFit fit_with_progress(const ConvexHull& hull, double tolerance, int spans) {
+  HullFitOptions options;
+  options.tolerance = tolerance;
+  options.spans = spans;
+  options.progress = [](const std::string& line) {
+    std::printf("  %s\n", line.c_str());
+    std::fflush(stdout);
+  };
+  return fit_hull(hull, options);
+}
+
+void fit(const FitArguments& a) {
+  const double tolerance = parse_share("fit: --tolerance", a.tolerance, kMostTolerance);
+  if (tolerance < kLeastTolerance)
+    throw UsageError("fit: --tolerance is " + a.tolerance + ", must be 0.02% at least");
+  const int spans = spans_of(a.patches);
+  bool keep_volume = false, keep_inertia = false;
+  if (!a.keep.empty()) {
+    keep_volume = a.keep.find("volume") != std::string::npos;
+    keep_inertia = a.keep.find("inertia") != std::string::npos;
+    if (a.keep != "volume" && a.keep != "inertia" && a.keep != "volume,inertia" && a.keep != "inertia,volume")
+      throw UsageError("fit: --keep is " + a.keep + ", must be volume, inertia or volume,inertia");
+  }
+  const TriangleMesh mesh = load_piece(a);
+  const MassProperties own = mesh_properties(mesh);
+  if (!(own.volume > 0)) throw ShapeError(a.file + ": encloses no volume");
+  std::unique_ptr<ConvexHull> hull;
+  HullFit best;
+  try {
+    hull = std::make_unique<ConvexHull>(mesh.points);
+    std::printf("convex hull: %zu vertices, adds %.3g %% to the mesh's volume of %.6g\n",
+                hull->mesh().points.size(), 100 * (hull->properties().volume / own.volume - 1), own.volume);
+    best = fit_with_progress(*hull, tolerance, spans);
+  } catch (const ShapeError& error) {
+    throw ShapeError(a.file + ": " + error.what());
+  }
+  ShapeFileContent content{best.surfaces, std::nullopt};
+  MassProperties mass = best.shape->mass;
+  if (keep_volume) {
+    const double scale = std::cbrt(own.volume / mass.volume);
+    transform(content.surfaces, scale * Mat3::Identity(), (1 - scale) * mass.center);
+    mass = solid_properties(content.surfaces);
+  }
+  if (keep_inertia) content.gyration = own.inertia / own.volume;
+  const auto shape = make_shape(a.output, content.surfaces, content.gyration);
+  if (keep_inertia) mass.inertia = own.inertia / own.volume * mass.volume;
+  write_whole(a.output, write_shape(content));
+  size_t points = 0;
+  for (const NurbsSurface& s : content.surfaces) points += s.points.size();
+  std::printf("%s: %s; %zu patches, %zu control points in the file\n", a.output.c_str(), best.kind.c_str(),
+              content.surfaces.size(), points);
+  std::printf("distance from the hull: %.3g %% outward, %.3g %% inward of its radius %.6g (bounds)\n",
+              100 * best.distance.outward / best.radius, 100 * best.distance.inward / best.radius,
+              best.radius);
+  if (keep_volume) {
+    const HullDistance kept = hull_distance(*shape, *hull, 0.01 * tolerance * best.radius);
+    std::printf("after scaling to the mesh's volume: %.3g %% outward, %.3g %% inward\n",
+                100 * kept.outward / best.radius, 100 * kept.inward / best.radius);
+  }
+  std::printf("joints smooth to %.2g degrees; curvature radius %.4g to %.4g\n", worst_kink(*shape),
+              shape->patch_curvature.min_radius, shape->patch_curvature.max_radius);
+  print_differences("the hull", mass, hull->properties(), best.radius);
+  print_differences("the mesh", mass, own, best.radius);
+}
+
+// Points of a body on a grid over every Bezier patch, about as dense whatever the patches.
+std::vector<Vec3> sample(const Shape& shape) {
+  const int n =
+      std::clamp(static_cast<int>(kSampleGrid * std::sqrt(6.0 / static_cast<double>(shape.patches.size()))),
+                 4, 2 * kSampleGrid);
+  std::vector<Vec3> points;
+  for (const BezierPatch& patch : shape.patches)
+    for (int i = 0; i <= n; ++i)
+      for (int j = 0; j <= n; ++j)
+        points.push_back(evaluate0(patch, static_cast<double>(i) / n, static_cast<double>(j) / n) +
+                         shape.mass.center);
+  return points;
+}
+
+size_t control_points(const std::vector<NurbsSurface>& surfaces) {
+  size_t count = 0;
+  for (const NurbsSurface& s : surfaces) count += s.points.size();
+  return count;
+}
+
+void simplify(const FitArguments& a) {
+  const double tolerance = parse_share("simplify: --tolerance", a.tolerance, kMostTolerance);
+  std::vector<std::string> warnings;
+  const auto shape = read_shape_file(a.file, &warnings);
+  print_warnings(warnings);
+  HullFit best;
+  double sag = 0;  // of the body over the hull of its samples
+  try {
+    const ConvexHull hull(sample(*shape));
+    const double radius = shape->bounding_radius;
+    sag = hull_distance(*shape, hull, 1e-5 * radius).outward / radius;
+    if (sag > 0.5 * tolerance)
+      throw ShapeError("the tolerance of " + format("%.3g", 100 * tolerance) +
+                       " % is finer than the body is sampled, " + format("%.2g", 200 * sag) + " % at least");
+    best = fit_with_progress(hull, tolerance - sag, spans_of(a.patches));
+  } catch (const ShapeError& error) {
+    throw ShapeError(a.file + ": " + error.what());
+  }
+  if (control_points(best.surfaces) >= control_points(shape->surfaces))
+    throw ShapeError(a.file + ": no body of fewer than its " +
+                     std::to_string(control_points(shape->surfaces)) + " control points is within " +
+                     format("%.3g", 100 * tolerance) + " % (bounds)");
+  ShapeFileContent content{best.surfaces, std::nullopt};
+  if ((shape->gyration - shape->mass.inertia / shape->mass.volume).norm() > 1e-9 * shape->gyration.norm())
+    content.gyration = shape->gyration;  // given in the file
+  write_whole(a.output, write_shape(content));
+  std::printf("%s: %s; %zu control points in place of %zu\n", a.output.c_str(), best.kind.c_str(),
+              control_points(best.surfaces), control_points(shape->surfaces));
+  std::printf("distance from %s: %.3g %% outward, %.3g %% inward of its radius (bounds)\n", a.file.c_str(),
+              100 * best.distance.outward / best.radius, 100 * (best.distance.inward / best.radius + sag));
+  print_differences("the body", best.shape->mass, shape->mass, best.radius);
+}
+
+constexpr char kFitNotes[] =
+    "The mesh must be closed; points may be doubled, triangles wound either way. The body is a smooth convex "
+    "one\n"
+    "near the mesh's convex hull: the simplest of a sphere and six bicubic or biquartic patches of 1, 2, 3, "
+    "4, 6, 8\n"
+    "spans whose largest distance from the hull, either way, is proven to be within the tolerance, a share "
+    "of the\n"
+    "hull's largest radius about its centre of mass.\n"
+    "Example: nurbs-shape fit grain.stl --tolerance 2% -o grain.json\n";
+
+}  // namespace
+
+Command add_fit(CLI::App& app) {
+  CLI::App* command = app.add_subcommand("fit", "fits a smooth convex body to a mesh (STL, OBJ, PLY)");
+  command->formatter(std::make_shared<Help>("nurbs-shape fit MESH [options] -o FILE"));
+  command->footer(kFitNotes);
+  const auto a = std::make_shared<FitArguments>();
+  command->add_option("MESH", a->file, "mesh file")->required();
+  command->add_option("-o", a->output, "shape file to write")->type_name("FILE")->required();
+  command->add_option("--tolerance", a->tolerance, "as 2% or 0.02, default 1%")->type_name("T");
+  command
+      ->add_option("--patches", a->patches, "6, 24, 54, 96, 216 or 384 Bezier patches; default: as few as do")
+      ->type_name("N");
+  command
+      ->add_option("--keep", a->keep,
+                   "volume (scales the body) and/or inertia (written beside it) of the mesh, not of its hull")
+      ->type_name("WHAT");
+  command->add_option("--piece", a->piece, "of a mesh of several pieces: largest, or its number")
+      ->type_name("P");
+  return {command, [a] { fit(*a); }};
+}
+
+Command add_simplify(CLI::App& app) {
+  CLI::App* command = app.add_subcommand("simplify", "fewer control points within a tolerance");
+  command->formatter(std::make_shared<Help>("nurbs-shape simplify FILE --tolerance T -o FILE"));
+  const auto a = std::make_shared<FitArguments>();
+  command->add_option("FILE", a->file, "shape file")->required();
+  command->add_option("-o", a->output, "shape file to write")->type_name("FILE")->required();
+  command->add_option("--tolerance", a->tolerance, "as 2% or 0.02 of the body's radius, default 1%")
+      ->type_name("T");
+  command->add_option("--patches", a->patches, "as for fit")->type_name("N");
+  return {command, [a] { simplify(*a); }};
+}
+
+}  // namespace nurbs

@@ -1,0 +1,216 @@
+#!/usr/bin/python3
+"""nurbs-shape fit and simplify: meshes of every kind of file; errors checked by sampling hull against body here."""
+import json
+import pathlib
+import re
+import subprocess
+import tempfile
+import unittest
+
+import numpy as np
+
+import deck
+import meshes
+
+PROGRAM = str(deck.BUILD / "nurbs-shape")
+
+
+def call(*arguments):
+    return subprocess.run([PROGRAM, *map(str, arguments)], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+                          timeout=300)
+
+
+def basis(degree, knots, count, t):
+    """Values of all `count` B-splines at the parameters t, and their first derivatives (Cox, de Boor)."""
+    knots = np.asarray(knots)
+    t = np.minimum(t, np.nextafter(knots[-1], 0))
+    b = [((knots[:-1] <= x) & (x < knots[1:])).astype(float) for x in t]
+    b = np.array(b)
+    lower = b
+    for p in range(1, degree + 1):
+        lower, n = b, len(knots) - p - 1
+        left, right = knots[p:p + n] - knots[:n], knots[p + 1:p + 1 + n] - knots[1:1 + n]
+        with np.errstate(divide="ignore", invalid="ignore"):
+            a = np.where(left > 0, (t[:, None] - knots[:n]) / left, 0)
+            c = np.where(right > 0, (knots[p + 1:p + 1 + n] - t[:, None]) / right, 0)
+        b = a * lower[:, :n] + c * lower[:, 1:n + 1]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        slope = degree * (np.where(left > 0, lower[:, :n] / left, 0) - np.where(right > 0, lower[:, 1:n + 1] / right, 0))
+    return b, slope
+
+
+def sample(file, n=40):
+    """Points and outward normals of a shape file's polynomial patches."""
+    points, normals = [], []
+    for s in json.loads(pathlib.Path(file).read_text())["shape"]["data"]:
+        net = np.array(s["control_points"]["points"]).reshape(s["size_u"], s["size_v"], 3)
+        weights = np.array(s["control_points"].get("weights") or np.ones(net.shape[:2])).reshape(net.shape[:2])
+        t = np.linspace(0, 1, n)
+        (bu, du), (bv, dv) = (basis(s["degree_" + x], s["knotvector_" + x], s["size_" + x], t) for x in "uv")
+        h = np.concatenate([net * weights[..., None], weights[..., None]], axis=2)
+        x, xu, xv = (np.einsum("ai,ijc,bj->abc", a, h, b) for a, b in ((bu, bv), (du, bv), (bu, dv)))
+        point = x[..., :3] / x[..., 3:]
+        xu, xv = ((d[..., :3] - d[..., 3:] * point) / x[..., 3:] for d in (xu, xv))
+        normal = np.cross(xu, xv)
+        length = np.linalg.norm(normal, axis=2, keepdims=True)
+        normals.append((normal / np.maximum(length, 1e-300)).reshape(-1, 3))
+        points.append(point.reshape(-1, 3))
+    return np.vstack(points), np.vstack(normals)
+
+
+def support_difference(file, vertices, n=40):
+    """Largest and least difference of the support functions of body and hull at the body's normals."""
+    points, normals = sample(file, n)
+    body = np.einsum("ij,ij->i", points, normals)
+    hull = np.concatenate([(block @ vertices.T).max(axis=1) for block in np.array_split(normals, 40)])
+    return (body - hull).max(), (body - hull).min()
+
+
+class Fit(unittest.TestCase):
+    def setUp(self):
+        directory = tempfile.TemporaryDirectory()
+        self.addCleanup(directory.cleanup)
+        self.place = pathlib.Path(directory.name)
+        self.out = self.place / "out.json"
+
+    def mesh(self, content, name="mesh.stl"):
+        file = self.place / name
+        file.write_bytes(content if isinstance(content, bytes) else content.encode())
+        return file
+
+    def fit(self, points, faces, *options):
+        self.out.unlink(missing_ok=True)
+        run = call("fit", self.mesh(meshes.binary_stl(points, faces)), *options, "-o", self.out)
+        self.assertEqual(run.returncode, 0, run.stderr)
+        return run.stdout
+
+    def assert_one_error(self, run, text):
+        self.assertEqual(run.returncode, 1, run.stderr)
+        self.assertRegex(run.stderr, r"\AERROR: [^\n]*\n\Z")
+        self.assertIn(text, run.stderr)
+        self.assertFalse(self.out.exists())
+        self.assertEqual([p.name for p in self.place.iterdir() if ".tmp" in p.name], [])
+
+    def assert_near(self, points, tolerance):
+        """The fit in self.out is within tolerance (of the hull's radius) of the points' hull, by sampling."""
+        center = points.mean(axis=0)  # near enough to that of mass for a radius
+        radius = np.linalg.norm(points - center, axis=1).max()
+        outward, inward = support_difference(self.out, points)
+        self.assertLess(outward, 1.03 * tolerance * radius)
+        self.assertGreater(inward, -1.03 * tolerance * radius)
+        check = call("check", self.out)
+        self.assertEqual(check.returncode, 0, check.stderr)
+        self.assertIn("closed, outward, convex", check.stdout)
+        self.assertEqual(check.stderr, "")
+
+    def test_sphere_becomes_a_sphere(self):
+        points, faces = meshes.icosphere(4)
+        said = self.fit(points + (5, -2, 1), faces)
+        self.assertIn("sphere", said)
+        info = call("info", self.out).stdout
+        inner, outer = (float(re.search(name + r" radius +(\S+)", info)[1]) for name in ("inner", "bounding"))
+        self.assertAlmostEqual(inner, outer, 9)
+        self.assertAlmostEqual(outer, 1, 2)
+
+    def test_ellipsoid_needs_few_points(self):
+        points, faces = meshes.icosphere(4)
+        points = points * (3, 2, 1)
+        said = self.fit(points, faces)
+        self.assertIn("56 control points", said)
+        self.assert_near(points, 0.01)
+        difference = float(re.search(r"against the mesh: volume ([-+]\S+) %", said)[1])
+        self.assertLess(abs(difference), 1)
+
+    def test_superellipsoid(self):
+        points, faces = meshes.icosphere(4)
+        points = points / (np.abs(points)**4).sum(axis=1)[:, None]**0.25
+        self.fit(points, faces, "--tolerance", "2%")
+        self.assert_near(points, 0.02)
+
+    def test_ten_grains(self):
+        for seed in range(1, 11):
+            with self.subTest(seed=seed):
+                points, faces = meshes.grain(seed, 3)
+                self.fit(points, faces, "--tolerance", "0.05")
+                self.assert_near(points, 0.05)
+
+    def test_a_grain_finer(self):
+        points, faces = meshes.grain(2, 4)
+        said = self.fit(points, faces, "--tolerance", "2%")
+        self.assert_near(points, 0.02)
+        bounds = [float(x) for x in re.search(r"distance from the hull: (\S+) % outward, (\S+) % inward", said).groups()]
+        self.assertLess(max(bounds), 2)
+        outward, inward = support_difference(self.out, points)
+        radius = float(re.search(r"of its radius (\S+) ", said)[1])
+        self.assertLess(outward, bounds[0] / 100 * radius * 1.001)  # a bound is one
+        self.assertLess(-inward, bounds[1] / 100 * radius * 1.001)
+
+    def test_every_kind_of_file_is_one_mesh(self):
+        points, faces = meshes.grain(4, 2)
+        turned = faces.copy()
+        turned[::3] = turned[::3, ::-1]
+        results = set()
+        for name, content in (("a.stl", meshes.ascii_stl(points, turned)), ("b.obj", meshes.obj(points, turned)),
+                              ("c.ply", meshes.ply(points, faces)), ("d.ply", meshes.ply(points, faces, "<")),
+                              ("e.ply", meshes.ply(points, turned, ">"))):
+            run = call("fit", self.mesh(content, name), "--tolerance", "5%", "-o", self.out)
+            self.assertEqual(run.returncode, 0, name + run.stderr)
+            added = float(re.search(r"adds (\S+) %", run.stdout)[1])
+            own = float(re.search(r"volume of (\S+)", run.stdout)[1])
+            results.add((added, own))
+        self.assertEqual(len(results), 1)
+        self.assertAlmostEqual(results.pop()[1], meshes.volume(points, faces), 4)
+
+    def test_keep_volume_and_inertia(self):
+        points, faces = meshes.grain(4, 3)
+        self.fit(points, faces, "--tolerance", "5%", "--keep", "volume,inertia")
+        info = call("info", self.out).stdout
+        self.assertAlmostEqual(float(re.search(r"volume +(\S+)", info)[1]) / meshes.volume(points, faces), 1, 5)
+        self.assertIn("gyration", json.loads(self.out.read_text()))
+
+    def test_pieces_are_named_and_chosen(self):
+        points, faces = meshes.icosphere(2)
+        two = self.mesh(meshes.binary_stl(np.vstack([points, 0.5 * points + 4]), np.vstack([faces, faces + len(points)])))
+        self.assert_one_error(call("fit", two, "-o", self.out), "has 2 pieces (1: 320 triangles")
+        self.assert_one_error(call("fit", two, "--piece", "3", "-o", self.out), "must be largest or 1 to 2")
+        run = call("fit", two, "--piece", "largest", "--tolerance", "5%", "-o", self.out)
+        self.assertEqual(run.returncode, 0, run.stderr)
+
+    def test_bad_meshes(self):
+        points, faces = meshes.icosphere(1)
+        whole = meshes.binary_stl(points, faces)
+        text = meshes.ascii_stl(points, faces)
+        nan = bytearray(whole)
+        nan[96:100] = b"\xff\xff\xff\x7f"
+        flat = points * (1, 1, 0)
+        for name, content, error in (
+                ("a.stl", b"", "empty"), ("a.stl", whole[:-20], "ends after 79"), ("a.stl", bytes(nan), "not finite"),
+                ("a.stl", text[:len(text) // 2], "a.stl: "), ("a.stl", text.replace("vertex", "vertx", 1), "unexpected"),
+                ("a.stl", meshes.binary_stl(points, faces[1:]), "is open: 3 edges"),
+                ("a.stl", meshes.binary_stl(flat, faces), "a.stl: "), ("a.stl", meshes.binary_stl(points, faces[:0]), "no triangles"),
+                ("a.obj", meshes.obj(points, faces + 1), "face corner '43'"), ("a.obj", "v 0 0\nf 1 1 1\n", "line 1"),
+                ("a.ply", meshes.ply(points, faces, "<")[:-3], "ends too early"), ("a.ply", "plx\n", "begin with 'ply'"),
+                ("a.ply", "ply\nformat ascii 1.0\n", "header does not end"), ("a.off", "OFF", "not known")):
+            with self.subTest(error=error):
+                self.assert_one_error(call("fit", self.mesh(content, name), "-o", self.out), error)
+        self.assert_one_error(call("fit", self.place / "none.stl", "-o", self.out), "cannot open")
+        mesh = self.mesh(whole)
+        for options, error in ((["--tolerance", "0"], "--tolerance"), (["--tolerance", "2x"], "not a share"),
+                               (["--tolerance", "80%"], "at most 50%"), (["--patches", "7"], "must be 6, 24"),
+                               (["--keep", "mass"], "--keep is mass")):
+            self.assert_one_error(call("fit", mesh, *options, "-o", self.out), error)
+
+    def test_simplify(self):
+        made = call("make", "superellipsoid", "--axes", "1,1,1.5", "--exponent", "2.5", "--spans", "8", self.place / "fine.json")
+        self.assertEqual(made.returncode, 0, made.stderr)
+        run = call("simplify", self.place / "fine.json", "--tolerance", "2%", "-o", self.out)
+        self.assertEqual(run.returncode, 0, run.stderr)
+        points, _ = sample(self.place / "fine.json", 40)
+        self.assert_near(points, 0.02)
+        again = call("simplify", self.out, "--tolerance", "0.03%", "-o", self.place / "again.json")
+        self.assertEqual(again.returncode, 1)
+        self.assertIn("ERROR: ", again.stderr)
+
+
+if __name__ == "__main__":
+    unittest.main()
