@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <charconv>
+#include <chrono>
 #include <cmath>
 #include <cstdio>
 #include <exception>
@@ -12,7 +13,9 @@
 #include <string>
 #include <vector>
 
+#include "body/mass_properties.h"
 #include "body/shape.h"
+#include "body/support.h"
 #include "io/shape_file.h"
 #include "nurbs/affine.h"
 #include "shapes/primitives.h"
@@ -523,6 +526,68 @@ void print_mass(const Shape& shape) {
   std::printf("  principal        %.12g %.12g %.12g\n", p[0], p[1], p[2]);
 }
 
+double surface_area(const Shape& shape) {  // by the midpoint rule on a fine grid: 4 digits
+  constexpr int kGrid = 48;
+  double area = 0;
+  for (const BezierPatch& patch : shape.patches)
+    for (int i = 0; i < kGrid; ++i)
+      for (int j = 0; j < kGrid; ++j) {
+        const Jet1 s = evaluate1(patch, (i + 0.5) / kGrid, (j + 0.5) / kGrid);
+        area += s.su.cross(s.sv).norm() / (kGrid * kGrid);
+      }
+  return area;
+}
+
+// What the field describes grains by; axes are those of the ellipsoid with the same second moments.
+void print_descriptors(const Shape& shape) {
+  const double volume = shape.mass.volume, area = surface_area(shape),
+               radius = std::cbrt(3 * volume / (4 * M_PI));
+  const PrincipalFrame frame = principal_frame(shape.mass.inertia / volume);
+  const Vec3& m = frame.moments;  // ascending: the first is about the longest axis
+  const double half = 0.5 * m.sum();
+  const Vec3 axes = (5 * (Vec3::Constant(half) - m)).cwiseMax(0).cwiseSqrt();
+  const Mat3 turn = frame.axes.toRotationMatrix();
+  std::printf("surface            %.6g\n", area);
+  std::printf("equivalent radius  %.6g (sphere of the same volume)\n", radius);
+  std::printf("sphericity         %.5g (surface of that sphere over the body's)\n",
+              4 * M_PI * radius * radius / area);
+  std::printf("semi-axes          %.6g %.6g %.6g (ellipsoid of the same moments)\n", axes[0], axes[1],
+              axes[2]);
+  std::printf("elongation I/L     %.5g\n", axes[1] / axes[0]);
+  std::printf("flatness S/I       %.5g\n", axes[2] / axes[1]);
+  for (int k = 0; k < 3; ++k)
+    std::printf("  axis %d           %.6g %.6g %.6g\n", k + 1, turn(0, k), turn(1, k), turn(2, k));
+}
+
+// What contacts cost, by what they spend their time in.
+void print_cost(const Shape& shape) {
+  const auto time = [](int calls, const auto& call) {
+    const auto begin = std::chrono::steady_clock::now();
+    for (int k = 0; k < calls; ++k) call(k);
+    return 1e9 * std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count() / calls;
+  };
+  double sum = 0;
+  const size_t count = shape.patches.size();
+  const double evaluation = time(20000, [&](int k) {
+    sum += evaluate2(shape.patches[static_cast<size_t>(k) % count], 0.3, std::fmod(0.618 * k, 1.0)).suv[0];
+  });
+  const double search = time(3000, [&](int k) {
+    const double z = 2 * std::fmod(0.618034 * k, 1.0) - 1, turn = 2.4 * k, r = std::sqrt(1 - z * z);
+    sum += find_support(shape, Vec3(r * std::cos(turn), r * std::sin(turn), z)).h;
+  });
+  std::printf(
+      "cost here          %.0f ns an evaluation with second derivatives, %.0f ns a support search%s\n",
+      evaluation, search, std::isfinite(sum) ? "" : " (not finite)");
+  const bool sphere = shape.inner_radius >= (1 - kSphere) * shape.bounding_radius;
+  std::printf("kind               %s\n", sphere ? "sphere: proofs take the closed form"
+                                         : !shape.smooth
+                                             ? "creased: contacts on creases take the polytope method"
+                                         : shape.dented() ? "dented: bridged by the convex hull"
+                                         : std::isinf(shape.patch_curvature.max_radius)
+                                             ? "smooth with flats"
+                                             : "smooth, strictly convex: the fast path throughout");
+}
+
 void print_form(const Shape& shape) {
   const Kinks kinks = worst_kinks(shape);
   std::printf("bounding radius    %.12g\n", shape.bounding_radius);
@@ -544,6 +609,8 @@ void info(const std::string& file) {
   print_surfaces(*shape);
   print_mass(*shape);
   print_form(*shape);
+  print_descriptors(*shape);
+  print_cost(*shape);
 }
 
 void check(const std::string& file) {
@@ -592,7 +659,7 @@ void run(CLI::App& app, int argc, char** argv) {
   const CLI::App* describer = add_reader("info", "describes a shape");
   const CLI::App* checker =
       add_reader("check", "exits with 0 if the file is a usable shape, 1 with the reason if not");
-  const Command commands[] = {add_fit(app), add_simplify(app)};
+  const Command commands[] = {add_fit(app), add_simplify(app), add_export(app), add_view(app)};
   app.parse(argc, argv);
 
   for (const Command& command : commands)

@@ -124,8 +124,8 @@ class Fit(unittest.TestCase):
     def test_superellipsoid(self):
         points, faces = meshes.icosphere(4)
         points = points / (np.abs(points)**4).sum(axis=1)[:, None]**0.25
-        self.fit(points, faces, "--tolerance", "2%")
-        self.assert_near(points, 0.02)
+        self.fit(points, faces, "--tolerance", "3%")
+        self.assert_near(points, 0.03)
 
     def test_ten_grains(self):
         for seed in range(1, 11):
@@ -135,11 +135,11 @@ class Fit(unittest.TestCase):
                 self.assert_near(points, 0.05)
 
     def test_a_grain_finer(self):
-        points, faces = meshes.grain(2, 4)
-        said = self.fit(points, faces, "--tolerance", "2%")
-        self.assert_near(points, 0.02)
+        points, faces = meshes.grain(2, 3)
+        said = self.fit(points, faces, "--tolerance", "3%")
+        self.assert_near(points, 0.03)
         bounds = [float(x) for x in re.search(r"distance from the hull: (\S+) % outward, (\S+) % inward", said).groups()]
-        self.assertLess(max(bounds), 2)
+        self.assertLess(max(bounds), 3)
         outward, inward = support_difference(self.out, points)
         radius = float(re.search(r"of its radius (\S+) ", said)[1])
         self.assertLess(outward, bounds[0] / 100 * radius * 1.001)  # a bound is one

@@ -1,0 +1,184 @@
+// nurbs-shape view, export: a body for other programs, as exact cells (VTU), triangles (STL) or a picture
+// (PNG).
+#include <unistd.h>
+
+#include <cmath>
+#include <cstdint>
+#include <cstdio>
+#include <cstdlib>
+#include <cstring>
+#include <filesystem>
+#include <memory>
+#include <sstream>
+
+#include "io/shape_file.h"
+#include "io/vtu_file.h"
+#include "tools/command.h"
+
+namespace nurbs {
+namespace {
+
+struct Arguments {
+  std::string file, output, tolerance = "0.1%";
+};
+
+constexpr int kMostCells = 400;  // of an STL grid, per Bezier patch parameter
+
+std::shared_ptr<const Shape> load(const std::string& file) {
+  std::vector<std::string> warnings;
+  auto shape = read_shape_file(file, &warnings);
+  print_warnings(warnings);
+  return shape;
+}
+
+std::string ending(const std::string& file) {
+  return std::filesystem::path(file).extension().string();
+}
+
+std::string vtu(const Shape& shape) {
+  VtuBody body;
+  body.id = body.type = 1;
+  body.position = shape.mass.center;
+  std::ostringstream out;
+  write_vtu(out, {body}, {&shape}, 0);
+  return out.str();
+}
+
+// Cells per parameter so that no chord of a circle of the patches' sharpest bend is off by more than `error`.
+int cells_for(const BezierPatch& patch, double error) {
+  double bend = 0;
+  for (int i = 0; i <= 8; ++i)
+    for (int j = 0; j <= 8; ++j) {
+      const Jet2 s = evaluate2(patch, i / 8.0, j / 8.0);
+      bend = std::max(bend, s.suu.norm() + 2 * s.suv.norm() + s.svv.norm());
+    }
+  return std::min(static_cast<int>(std::ceil(std::sqrt(bend / (8 * error)))) + 1, kMostCells);
+}
+
+void put(std::string& out, const Vec3& v) {
+  for (int c = 0; c < 3; ++c) {
+    const float x = static_cast<float>(v[c]);
+    std::uint32_t bits;
+    std::memcpy(&bits, &x, sizeof bits);
+    for (int k = 0; k < 4; ++k) out += static_cast<char>(bits >> 8 * k & 255);
+  }
+}
+
+// Binary STL. All patches share one number of cells per parameter, so that edges meet.
+std::string stl(const Shape& shape, double error, size_t* count) {
+  int cells = 2;
+  for (const BezierPatch& patch : shape.patches) cells = std::max(cells, cells_for(patch, error));
+  std::string body;
+  std::uint32_t triangles = 0;
+  for (const BezierPatch& patch : shape.patches) {
+    const auto at = [&](int i, int j) {
+      return Vec3(evaluate0(patch, static_cast<double>(i) / cells, static_cast<double>(j) / cells) +
+                  shape.mass.center);
+    };
+    for (int i = 0; i < cells; ++i)
+      for (int j = 0; j < cells; ++j) {
+        const Vec3 p[4] = {at(i, j), at(i + 1, j), at(i + 1, j + 1), at(i, j + 1)};
+        for (const auto& [b, c] : {std::pair{1, 2}, std::pair{2, 3}}) {
+          const Vec3 normal = (p[b] - p[0]).cross(p[c] - p[0]);
+          if (!(normal.norm() > 1e-14 * shape.bounding_radius * shape.bounding_radius))
+            continue;  // at a pole
+          put(body, normal.normalized());
+          put(body, p[0]);
+          put(body, p[b]);
+          put(body, p[c]);
+          body.append(2, '\0');
+          ++triangles;
+        }
+      }
+  }
+  std::string out = "NURBS body " + shape.name;
+  out.resize(80, ' ');
+  for (int k = 0; k < 4; ++k) out += static_cast<char>(triangles >> 8 * k & 255);
+  *count = triangles;
+  return out + body;
+}
+
+void export_shape(const Arguments& a) {
+  const double share = parse_share("export: --tolerance", a.tolerance, 0.1);
+  const std::string kind = ending(a.output);
+  if (kind != ".stl" && kind != ".vtu")
+    throw UsageError("export: ending '" + kind + "' is not known; -o takes .stl or .vtu");
+  const auto shape = load(a.file);
+  if (kind == ".vtu") {
+    write_whole(a.output, vtu(*shape));
+    std::printf("%s: %zu exact cells\n", a.output.c_str(), shape->patches.size());
+    return;
+  }
+  size_t triangles = 0;
+  write_whole(a.output, stl(*shape, share * shape->bounding_radius, &triangles));
+  std::printf("%s: %zu triangles\n", a.output.c_str(), triangles);
+}
+
+// The picture is drawn by a Python script beside the program or in the source tree.
+std::string find_script() {
+  std::error_code error;
+  const std::filesystem::path program = std::filesystem::read_symlink("/proc/self/exe", error);
+  for (const auto& folder : {program.parent_path(), program.parent_path().parent_path() / "src/tools"}) {
+    const auto script = folder / "view_shape.py";
+    if (std::filesystem::exists(script, error)) return script.string();
+  }
+  throw std::runtime_error(
+      "view: view_shape.py is neither beside the program nor in ../src/tools: -o FILE.vtu needs no script");
+}
+
+std::string quoted(const std::string& word) {
+  std::string out = "'";
+  for (char c : word) out += c == '\'' ? std::string("'\\''") : std::string(1, c);
+  return out + "'";
+}
+
+void view(const Arguments& a) {
+  const std::string kind = ending(a.output);
+  if (kind != ".png" && kind != ".vtu")
+    throw UsageError("view: ending '" + kind + "' is not known; -o takes .png or .vtu");
+  const auto shape = load(a.file);
+  if (kind == ".vtu") {
+    write_whole(a.output, vtu(*shape));
+  } else {
+    const std::string mesh = a.output + "." + std::to_string(getpid()) + ".stl", draft = mesh + ".png";
+    size_t triangles = 0;
+    write_whole(mesh, stl(*shape, 1e-3 * shape->bounding_radius, &triangles));
+    const std::string command = "/usr/bin/python3 -W ignore " + quoted(find_script()) + " " + quoted(draft) +
+                                " " + quoted(mesh) + " >/dev/null 2>&1";
+    const int status = std::system(command.c_str());
+    std::remove(mesh.c_str());
+    if (status != 0 || std::rename(draft.c_str(), a.output.c_str()) != 0) {
+      std::remove(draft.c_str());
+      throw std::runtime_error("view: can't draw " + a.output +
+                               ": needs python3-vtk9, and xvfb where there is no display");
+    }
+  }
+  std::printf("%s\n", a.output.c_str());
+}
+
+}  // namespace
+
+Command add_export(CLI::App& app) {
+  CLI::App* command = app.add_subcommand("export", "writes STL triangles or VTU cells for other programs");
+  command->formatter(std::make_shared<Help>("nurbs-shape export FILE [--tolerance T] -o FILE.stl|vtu"));
+  const auto a = std::make_shared<Arguments>();
+  command->add_option("FILE", a->file, "shape file")->required();
+  command->add_option("-o", a->output, "file to write: .stl, or .vtu (exact rational Bezier cells)")
+      ->type_name("FILE")
+      ->required();
+  command->add_option("--tolerance", a->tolerance, "of STL triangles, of the bounding radius, default 0.1%")
+      ->type_name("T");
+  return {command, [a] { export_shape(*a); }};
+}
+
+Command add_view(CLI::App& app) {
+  CLI::App* command =
+      app.add_subcommand("view", "draws a picture (PNG), or writes exact cells for ParaView (VTU)");
+  command->formatter(std::make_shared<Help>("nurbs-shape view FILE -o FILE.png|vtu"));
+  const auto a = std::make_shared<Arguments>();
+  command->add_option("FILE", a->file, "shape file")->required();
+  command->add_option("-o", a->output, "picture or VTU file to write")->type_name("FILE")->required();
+  return {command, [a] { view(*a); }};
+}
+
+}  // namespace nurbs
