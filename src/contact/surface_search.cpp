@@ -11,6 +11,7 @@ namespace nurbs {
 namespace {
 
 constexpr int kFewCells = 4;             // of a plane, up to which each is looked at on its own
+constexpr double kOneSlope = 0.8;        // cosine
 constexpr double kSamePlane = 1 - 1e-6;  // cosine: a former contact's polygon stood on this plane
 constexpr double kSameNormal = 0.9;      // cosine: a former contact this near has a start for the search
 
@@ -113,20 +114,23 @@ class SurfaceSearch {
     return point;
   }
 
-  // Whether a flat feature of the body meets the plane, over the wall or beside it.
+  // Whether a flat feature of the body stands on the plane.
   bool stand_on(int number) {
     const ActivePlane& met = planes_[number];
     bool stands = false;
     for (int k = 0; k < former_count_ && !stands; ++k)
       stands = former_[k].flat && former_[k].normal.dot(met.normal) > kSamePlane;
     if (!stands) {
+      // Where several planes of about one slope are met, the surface is bent under the body, and its features
+      // stand on points.
+      for (const int other : workspace().active)
+        if (other != number && planes_[other].normal.dot(met.normal) > kOneSlope) return false;
       PlaneRegion& region = workspace().region;
       plane_region(patch_, number, particle_.x, &region);
       ContactPolygon polygon;
       const RegionContact contact =
           make_region_polygon(particle_, region, particle_.x, -kReach * met.result.gap, &polygon);
-      if (contact == RegionContact::point) return false;
-      if (contact == RegionContact::clear) return true;
+      if (contact != RegionContact::polygon) return false;
     }
     add_plane(number, patch_.unbounded() ? 0 : patch_.planes()[number].leader, true);
     return true;
@@ -299,6 +303,24 @@ class SurfaceSearch {
     return patch_.cells()[patch_.cell_at(v.first_cell)].plane;
   }
 
+  // A corner of the body sharper than its overlap is deep: f has no maximum between the planes, and the
+  // shallower one takes over at once.
+  FeatureContact pointed(const MeshPatch::Edge& e) const {
+    FeatureContact f;
+    f.gap = -kFarAway;
+    for (int i = e.first_side; i < e.first_side + e.sides; ++i) {
+      const ActivePlane& met = planes_[patch_.cells()[patch_.side(i).cell].plane];
+      if (!(met.result.gap > f.gap)) continue;
+      f.touching = true;
+      f.gap = met.result.gap;
+      f.normal = met.normal;
+      f.on_body = met.deepest;
+      f.where = warm_point(met.memory.on_b, *particle_.shape);
+    }
+    f.along = e.direction.dot(particle_.x + f.on_body - patch_.vertices()[e.v[0]].x);
+    return f;
+  }
+
   bool all_open(const MeshPatch::Edge& e) const {
     for (int i = e.first_side; i < e.first_side + e.sides; ++i) {
       const ActivePlane& met = planes_[patch_.cells()[patch_.side(i).cell].plane];
@@ -325,10 +347,10 @@ class SurfaceSearch {
       return;
     }
     Range r;
-    if (!range(e, &r)) return;
     SurfacePoint start;
-    const FeatureContact f =
-        find_line_contact(particle_, a, e.direction, r.low, r.high, 0, point_for(r.low, &start));
+    const FeatureContact f = range(e, &r) ? find_line_contact(particle_, a, e.direction, r.low, r.high, 0,
+                                                              point_for(r.low, &start))
+                                          : pointed(e);
     MetEdge& met = edges_[number];
     met.state = !f.touching             ? MetEdge::clear
                 : !(f.along > 0)        ? MetEdge::before
