@@ -182,6 +182,18 @@ class Meshes(unittest.TestCase):
             np.testing.assert_allclose(frames(mesh), frames(plane), rtol=0, atol=1e-7)
         self.assertGreater(plane.thermo["led[4]"][-1], 0.01)
 
+    def test_the_hosts_models(self):
+        materials = "\n".join(f"fix {name} all property/global {words}" for name, words in (
+            ("m1", "youngsModulus peratomtype 5e6"), ("m2", "poissonsRatio peratomtype 0.3"),
+            ("m3", "coefficientRestitution peratomtypepair 1 0.6"), ("m4", "coefficientFriction peratomtypepair 1 0.4"))) + "\n"
+        law = "type 1 model hertz tangential history"
+        plane = run("plane 0 0 0 0 0 1", before=materials, law=law)
+        mesh = run("mesh m", before=materials + MESH, law=law, mesh=sheet(5, 0.19))
+        np.testing.assert_allclose(frames(mesh), frames(plane), rtol=0, atol=2e-8)
+        rough = run("mesh m", before=materials + MESH, law=law, mesh=hills())
+        self.assertLess(np.ptp(rough.thermo["ledger"]), 1e-3 * rough.thermo["led[3]"][-1])
+        self.assertEqual(last(run("mesh m", before=materials + MESH, law=law, mesh=hills(), ranks=2)), last(rough))
+
     def test_massflow_counts(self):
         ball = [(1, 1, 1, 0.03, 2500.0, 0.0, 0.0, 0.2, 1.0, 0.0, 0.0, 0.0)]
         door = sheet(2, 0.1, lambda x, y: 0.12)
