@@ -12,6 +12,7 @@ namespace nurbs {
 
 // Of every contact of a model; plain doubles.
 struct ModelMemory {
+  double kind;                      // of the model whose numbers follow
   double curvature_a, curvature_b;  // of the equivalent spheres, 1 / length; both 0: not yet known
   double phase;  // since the contact began, of an oscillator with its mass and stiffness, rad
   double normal_energy, tangential_energy;  // in the springs
@@ -45,6 +46,8 @@ class ContactModel {
   virtual ~ContactModel() = default;
   // The model's own numbers of a contact: at most kMostModelMemory - kModelMemory.
   virtual int history_size() const = 0;
+  // A whole number that tells models with different numbers apart.
+  virtual double kind() const = 0;
   virtual void force(ModelContact& contact) const = 0;
   // The equivalent spheres have the bodies' volumes instead of their curvatures.
   virtual bool volume_radius() const = 0;

@@ -310,6 +310,9 @@ void HostModels::build(int narg, char** arg) {
                                           choices[2].chosen.id, choices[3].chosen.id);
   const std::string wrong = models_->set(narg, arg);
   if (!wrong.empty()) fail_all(FLERR, lmp_, user_ + ": " + wrong);
+  std::uint32_t hash = 2166136261u;  // Fowler, Noll and Vo's: the same in every build
+  for (const char c : layout()) hash = (hash ^ static_cast<unsigned char>(c)) * 16777619u;
+  kind_ = hash;
   if (history_size() > nurbs::kMostModelMemory - nurbs::kModelMemory)
     fail_all(FLERR, lmp_, user_ + ": these models keep too much history");
 }

@@ -44,6 +44,7 @@ class HostModels : public nurbs::ContactModel {
   std::string unknown_energies() const;
 
   int history_size() const override;
+  double kind() const override { return kind_; }
   void force(nurbs::ModelContact& contact) const override;
   bool volume_radius() const override { return volume_radius_; }
 
@@ -56,6 +57,7 @@ class HostModels : public nurbs::ContactModel {
   int wall_type_;
   bool volume_radius_ = false;
   std::string text_;
+  double kind_ = 0;  // of the layout
   std::unique_ptr<Combination> models_;
 };
 

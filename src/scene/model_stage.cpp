@@ -16,6 +16,7 @@
 // the normal it is damping; across it, and of rolling, friction if the contact slides or rolls, else damping.
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 
 #include "scene/contact_results.h"
 
@@ -69,6 +70,10 @@ void ContactStages::ask_model(ContactBlock& block, int lane, const ContactGeomet
   const int a = block.a[lane], b = block.b[lane];
   const BodyRecord &ra = record(a), &rb = record(b);
   ModelMemory& own = model_memory(block, lane);
+  if (own.kind != step_.model->kind()) {  // a new contact, or one of another model, by a restart
+    std::fill_n(pool_.memory(block, lane), pool_.memory_size(), 0.0);
+    own.kind = step_.model->kind();
+  }
   const ModelMemory old = own;
   ContactState before, state{};
   block.get(lane, kStateField, kContactStateSize, &before);
@@ -196,7 +201,9 @@ void ContactStages::finish_model(ContactBlock& block, int lane) {
 // A contact that takes another one's place: it has its history, and its spheres are to be found.
 void ContactStages::take_over_model(const double* from, ContactBlock& block, int lane) {
   double* to = pool_.memory(block, lane);
-  std::fill_n(to, kModelMemory, 0.0);
+  ModelMemory own{};
+  own.kind = reinterpret_cast<const ModelMemory*>(from)->kind;
+  std::memcpy(to, &own, sizeof own);
   std::copy_n(from + kModelMemory, pool_.memory_size() - kModelMemory, to + kModelMemory);
 }
 
