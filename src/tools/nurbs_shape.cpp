@@ -2,6 +2,7 @@
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <array>
+#include <cctype>
 #include <charconv>
 #include <chrono>
 #include <cmath>
@@ -407,6 +408,16 @@ const std::vector<Maker>& makers() {
   return kMakers;
 }
 
+// The host wants primes above 10000 for seeds.
+int next_prime(int n) {
+  for (;;) {
+    ++n;
+    bool prime = n > 2 && n % 2 == 1;
+    for (int d = 3; prime && d * d <= n; d += 2) prime = n % d != 0;
+    if (prime) return n;
+  }
+}
+
 // Many random pebbles, and a deck that inserts them.
 const std::vector<Argument> kPebblesOptions = {
     {"--count", "N", "1 to 100000"},
@@ -416,7 +427,7 @@ const std::vector<Argument> kPebblesOptions = {
     {"--elongation", "LO,HI", "default 0.6,1"},
     {"--flatness", "LO,HI", "default 0.5,1"}};
 constexpr char kPebblesNotes[] =
-    "Writes FILE-1.json .. FILE-N.json and FILE.deck, whose lines (atom_style, particletemplate, a "
+    "Writes FILE_1.json .. FILE_N.json and FILE.deck, whose lines (atom_style, particletemplate, a "
     "distribution of equal\n"
     "shares) go into a deck; a .json at the end of FILE is left out.";
 
@@ -425,6 +436,9 @@ void make_pebbles(const Options& options) {
   std::string stem = options.output();
   if (stem.size() > 5 && stem.substr(stem.size() - 5) == ".json") stem.resize(stem.size() - 5);
   const std::string name = std::filesystem::path(stem).filename().string();
+  std::string id = name;  // of fixes: the host takes letters, digits and underscores
+  for (char& c : id)
+    if (!std::isalnum(static_cast<unsigned char>(c))) c = '_';
   options.numbers("--count", 1, 1, 100000);
   const std::uint64_t count = whole(options, "--count", 1, 1, 100000),
                       seed = whole(options, "--seed", 1, 0, kMostSeed);
@@ -434,6 +448,7 @@ void make_pebbles(const Options& options) {
   const auto elongation = options.has("--elongation") ? range(options, "--elongation", 0, 0.2) : both(0.6, 1);
   const auto flatness = options.has("--flatness") ? range(options, "--flatness", 0, 0.2) : both(0.5, 1);
   std::vector<std::string> files;
+  int prime = 100000;
   std::string style = "atom_style nurbs", templates, distribution;
   for (std::uint64_t k = 0; k < count; ++k) {
     const auto draw = [&](const std::array<double, 2>& r, double step) {  // a lattice of low discrepancy
@@ -443,18 +458,18 @@ void make_pebbles(const Options& options) {
                           draw(flatness, 0.5497004779019703), radius};
     files.push_back(write_shape({random_pebble(seed * 1000003 + k, form), std::nullopt}));
     const std::string number = std::to_string(k + 1);
-    style += " &\n  " + name + "-" + number + ".json";
-    templates += "fix " + name + "-" + number + " all particletemplate/nurbs " +
-                 std::to_string(100003 + 2 * k) + " atom_type 1 density constant 2500 shape " + name + "-" +
-                 number + " scale constant 1\n";
-    distribution += " &\n  " + name + "-" + number + " " + format("%.9g", 1 / static_cast<double>(count));
+    style += " &\n  " + name + "_" + number + ".json";
+    templates += "fix " + id + "_" + number + " all particletemplate/nurbs " +
+                 std::to_string(prime = next_prime(prime)) + " atom_type 1 density constant 2500 shape " +
+                 name + "_" + number + " scale constant 1\n";
+    distribution += " &\n  " + id + "_" + number + " " + format("%.9g", 1 / static_cast<double>(count));
   }
   for (std::uint64_t k = 0; k < count; ++k)
-    write_whole(stem + "-" + std::to_string(k + 1) + ".json", files[k]);
-  write_whole(stem + ".deck", style + "\n\n" + templates + "fix " + name +
+    write_whole(stem + "_" + std::to_string(k + 1) + ".json", files[k]);
+  write_whole(stem + ".deck", style + "\n\n" + templates + "fix " + id +
                                   " all particledistribution/discrete 15485863 " + std::to_string(count) +
                                   distribution + "\n");
-  std::printf("%s-1.json to %s-%llu.json, %s.deck\n", stem.c_str(), stem.c_str(),
+  std::printf("%s_1.json to %s_%llu.json, %s.deck\n", stem.c_str(), stem.c_str(),
               static_cast<unsigned long long>(count), stem.c_str());
 }
 

@@ -118,7 +118,7 @@ class NurbsShape(unittest.TestCase):
         self.assertEqual(made.returncode, 0, made.stderr)
         texts = set()
         for k in range(1, 51):
-            file = self.place / f"p-{k}.json"
+            file = self.place / f"p_{k}.json"
             texts.add(file.read_text())
             check = call("check", str(file))
             self.assertEqual((check.returncode, check.stderr), (0, ""), file)
@@ -130,7 +130,17 @@ class NurbsShape(unittest.TestCase):
         again = call("make", "pebbles", "--count", "1", "--seed", "7", "--elongation", "0.7", "--flatness", "0.5,0.6",
                      "-o", str(self.file))
         self.assertEqual(again.returncode, 0, again.stderr)
-        self.assertIn((self.place / "shape-1.json").read_text(), texts)
+        self.assertIn((self.place / "shape_1.json").read_text(), texts)
+
+    def test_pebbles_deck_is_the_host_s(self):
+        made = call("make", "pebbles", "--count", "3", "-o", str(self.place / "my-p"))
+        self.assertEqual(made.returncode, 0, made.stderr)
+        style, fixes = (self.place / "my-p.deck").read_text().split("\n\n", 1)
+        text = "\n".join(["units si", "newton off", "communicate single vel yes", style, "boundary p p f",
+                          "region box block -4 4 -4 4 -2 10 units box", "create_box 1 box", "neighbor 0.3 bin",
+                          "pair_style gran/nurbs", "pair_coeff * * kn 1e7 kt 5e6 mu 0.4", fixes,
+                          "fix motion all nve/nurbs", "run 0", ""])
+        deck.run_ok(text, files={f"my-p_{k}.json": self.place / f"my-p_{k}.json" for k in (1, 2, 3)})
 
     def test_info_names_mass_and_inertia(self):
         self.assertEqual(call("make", "sphere", "--radius", "2", "-o", str(self.file)).returncode, 0)
