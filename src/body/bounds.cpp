@@ -7,6 +7,7 @@
 #include <limits>
 #include <queue>
 
+#include "nurbs/bernstein.h"
 #include "nurbs/tolerances.h"
 
 namespace nurbs {
@@ -19,12 +20,6 @@ struct Field {
   std::vector<double> num, den;
   double upper = 0;  // largest ratio of coefficients: bounds the field since den > 0
 };
-
-double binomial(int n, int k) {
-  double b = 1;
-  for (int i = 1; i <= k; ++i) b = b * (n - k + i) / i;
-  return b;
-}
 
 void update_upper(Field& f) {
   f.upper = -std::numeric_limits<double>::infinity();

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <limits>
 
+#include "body/joints.h"
 #include "body/local_form.h"
 #include "nurbs/tolerances.h"
 
@@ -66,6 +67,20 @@ double closest_parameter(const BezierPatch& patch, int edge, const Vec3& x) {
   return 0.5 * (lo + hi);
 }
 
+// Closest point of an edge by Gauss-Newton from `t`, a parameter near it: a few steps, since the curves
+// coincide.
+double refine_closest(const BezierPatch& patch, int edge, const Vec3& x, double t) {
+  for (int i = 0; i < 8; ++i) {
+    const Vec2 p = edge_parameters(edge, t);
+    const Jet1 j = evaluate1(patch, p[0], p[1]);
+    const Vec3& along = edge < 2 ? j.sv : j.su;
+    const double before = t;
+    t = std::clamp(t + (x - j.s).dot(along) / along.squaredNorm(), 0.0, 1.0);
+    if (std::abs(t - before) < kParameterRoundoff) break;
+  }
+  return t;
+}
+
 double same_parameter_gap(const Edge& a, const Edge& b, bool reversed) {
   double gap = 0;
   for (int k = 0; k < kEdgeSamples; ++k) {
@@ -87,11 +102,29 @@ double curve_gap(const std::vector<BezierPatch>& patches, const Edge& a, const E
   return std::max(gap, (edge_point(patches[a.patch], a.edge, t) - middle).norm());
 }
 
+// Two edges that agree. `a` < `b` are indices; the rest is a's link to b, see EdgeLink.
 struct Candidate {
-  int a = 0, b = 0;  // indices into the edges, a < b
-  bool reversed = false;
-  double gap = 0;
+  int a = 0, b = 0;
+  bool reversed = false, projected = false;
+  double ratio = 1, gap = 0;
 };
+
+EdgeLink link_of(const Candidate& c, const Edge& to) {
+  EdgeLink link;
+  link.patch = to.patch;
+  link.edge = to.edge;
+  link.reversed = c.reversed;
+  link.projected = c.projected;
+  link.ratio = c.ratio;
+  return link;
+}
+
+// The same link from the other side.
+Candidate turned(Candidate c) {
+  std::swap(c.a, c.b);
+  if (!c.reversed) c.ratio = 1 / c.ratio;
+  return c;
+}
 
 bool ends_agree(const Edge& a, const Edge& b, bool reversed, double tolerance) {
   const Vec3& first = reversed ? b.at.back() : b.at.front();
@@ -99,17 +132,37 @@ bool ends_agree(const Edge& a, const Edge& b, bool reversed, double tolerance) {
   return (a.at.front() - first).norm() <= tolerance && (a.at.back() - last).norm() <= tolerance;
 }
 
-void add_candidates(const std::vector<BezierPatch>& patches, const std::vector<Edge>& edges, int a, int b,
-                    double tolerance, std::vector<Candidate>& out) {
+// The ratio of the map that takes a's middle to the closest point of b.
+double ratio_between(const std::vector<BezierPatch>& patches, const Edge& a, const Edge& b) {
+  const double t = closest_parameter(patches[b.patch], b.edge, a.at[kEdgeSamples / 2]);
+  const double s =
+      std::clamp(refine_closest(patches[b.patch], b.edge, a.at[kEdgeSamples / 2], t), 1e-6, 1 - 1e-6);
+  return s / (1 - s);
+}
+
+void add_candidates(const std::vector<BezierPatch>& patches, const std::vector<Edge>& edges, int first,
+                    int second, double tolerance, std::vector<Candidate>& out) {
+  const Edge &a = edges[std::min(first, second)], &b = edges[std::max(first, second)];
   for (bool reversed : {false, true}) {
-    if (!ends_agree(edges[a], edges[b], reversed, tolerance)) continue;
-    double gap = same_parameter_gap(edges[a], edges[b], reversed);
-    if (gap > tolerance) {
-      const bool closed = (edges[a].at.front() - edges[a].at.back()).norm() <= tolerance;
-      if (closed) continue;  // on a closed curve only equal parameters tell the direction
-      gap = curve_gap(patches, edges[a], edges[b]);
+    if (!ends_agree(a, b, reversed, tolerance)) continue;
+    Candidate c{std::min(first, second), std::max(first, second), reversed};
+    const auto gap = [&](const Candidate& k) {
+      return bound_joint_gap(patches[a.patch], a.edge, patches[b.patch], link_of(k, b));
+    };
+    c.gap = gap(c);
+    if (c.gap > kSameParameters * tolerance) {  // more than rounded digits: other parameters may fit better
+      Candidate other = c;
+      other.ratio = ratio_between(patches, a, b);
+      other.gap = gap(other);
+      if (other.gap < 0.5 * c.gap) c = other;
     }
-    if (gap <= tolerance) out.push_back({std::min(a, b), std::max(a, b), reversed, gap});
+    const bool closed = (a.at.front() - a.at.back()).norm() <= tolerance;
+    if (c.gap > tolerance && !closed && curve_gap(patches, a, b) <= tolerance) {
+      c.ratio = 1;
+      c.projected = true;
+      c.gap = gap(c);
+    }
+    if (c.gap <= tolerance) out.push_back(c);
   }
 }
 
@@ -136,14 +189,9 @@ std::vector<Candidate> find_candidates(const std::vector<BezierPatch>& patches,
   return out;
 }
 
-void join(const Edge& a, const Edge& b, bool reversed, PatchLinks& links) {
-  EdgeLink& la = links[a.patch][a.edge];
-  EdgeLink& lb = links[b.patch][b.edge];
-  la.patch = b.patch;
-  la.edge = b.edge;
-  lb.patch = a.patch;
-  lb.edge = a.edge;
-  la.reversed = lb.reversed = reversed;
+void join(const Edge& a, const Edge& b, const Candidate& c, PatchLinks& links) {
+  links[a.patch][a.edge] = link_of(c, b);
+  links[b.patch][b.edge] = link_of(turned(c), a);
 }
 
 UnmatchedEdge describe_unmatched(const std::vector<Edge>& edges, const PatchLinks& links, int left) {
@@ -170,20 +218,6 @@ UnmatchedEdge describe_unmatched(const std::vector<Edge>& edges, const PatchLink
 double signed_angle(const Vec3& normal_a, const Vec3& normal_b, const Vec3& along) {
   const double angle = angle_between(normal_a, normal_b);
   return along.cross(normal_a).dot(normal_b) >= 0 ? angle : -angle;
-}
-
-// Closest point of an edge by Gauss-Newton from `t`, a parameter near it: a few steps, since the curves
-// coincide.
-double refine_closest(const BezierPatch& patch, int edge, const Vec3& x, double t) {
-  for (int i = 0; i < 8; ++i) {
-    const Vec2 p = edge_parameters(edge, t);
-    const Jet1 j = evaluate1(patch, p[0], p[1]);
-    const Vec3& along = edge < 2 ? j.sv : j.su;
-    const double before = t;
-    t = std::clamp(t + (x - j.s).dot(along) / along.squaredNorm(), 0.0, 1.0);
-    if (std::abs(t - before) < kParameterRoundoff) break;
-  }
-  return t;
 }
 
 // Adds the groove between two sides that meet at a concave angle, see measure_kinks.
@@ -216,7 +250,9 @@ double edge_kink(const std::vector<BezierPatch>& patches, int p, int e, const Ed
     // An end of the edge may be a pole, where the kink has no meaning; the next sample sees it.
     const bool end = k == 0 || k == kKinkSamples - 1;
     if (end && (a.u != at[0] || a.v != at[1])) continue;
-    const double s = refine_closest(patches[link.patch], link.edge, a.point, partner_parameter(link, t));
+    const double guess =
+        link.projected ? projected_parameter(patches[link.patch], link, a.point) : partner_parameter(link, t);
+    const double s = refine_closest(patches[link.patch], link.edge, a.point, guess);
     const Vec2 there = edge_parameters(link.edge, s);
     const LocalForm b = local_form(patches[link.patch], there[0], there[1]);
     if (end && (b.u != there[0] || b.v != there[1])) continue;
@@ -260,17 +296,8 @@ int boundary_sense(int edge) {
 
 }  // namespace
 
-Vec2 edge_parameters(int edge, double t) {
-  switch (edge) {
-    case 0:
-      return {0, t};
-    case 1:
-      return {1, t};
-    case 2:
-      return {t, 0};
-    default:
-      return {t, 1};
-  }
+double projected_parameter(const BezierPatch& partner, const EdgeLink& link, const Vec3& x) {
+  return closest_parameter(partner, link.edge, x);
 }
 
 UnmatchedEdge connect_patches(const std::vector<BezierPatch>& patches, double tolerance, PatchLinks& links) {
@@ -284,7 +311,7 @@ UnmatchedEdge connect_patches(const std::vector<BezierPatch>& patches, double to
   }
   for (const Candidate& c : find_candidates(patches, edges, tolerance)) {
     const Edge &a = edges[c.a], &b = edges[c.b];
-    if (links[a.patch][a.edge].patch < 0 && links[b.patch][b.edge].patch < 0) join(a, b, c.reversed, links);
+    if (links[a.patch][a.edge].patch < 0 && links[b.patch][b.edge].patch < 0) join(a, b, c, links);
   }
   for (size_t i = 0; i < edges.size(); ++i) {
     const EdgeLink& link = links[edges[i].patch][edges[i].edge];
@@ -299,11 +326,22 @@ KinkSummary measure_kinks(const std::vector<BezierPatch>& patches, PatchLinks& l
     for (int e = 0; e < 4; ++e) {
       EdgeLink& link = links[p][e];
       if (link.collapsed) {
-        link.kink = pole_kink(patches[p], e);
+        link.gap = bound_collapsed_edge(patches[p], e);
+        link.kink_bound = std::min(M_PI, bound_pole_spread(patches[p], e));
+        link.kink = link.kink_bound <= kNoKink ? 0 : pole_kink(patches[p], e);
         worst.convex = std::max(worst.convex, link.kink);
       } else {
+        link.gap = bound_joint_gap(patches[p], e, patches[link.patch], link);
+        const KinkBounds bounds = bound_kink(patches[p], e, patches[link.patch], link);
+        link.kink_bound = std::min(M_PI, std::max(bounds.opening, bounds.closing));
         link.kink = edge_kink(patches, static_cast<int>(p), e, link, worst);
+        if (!link.projected) {
+          if (bounds.opening > kNoKink) worst.convex = std::max(worst.convex, std::min(M_PI, bounds.opening));
+          if (bounds.closing > kNoKink)
+            worst.concave = std::max(worst.concave, std::min(M_PI, bounds.closing));
+        }
       }
+      worst.gap = std::max(worst.gap, link.gap);
     }
   }
   return worst;

@@ -12,11 +12,31 @@ namespace nurbs {
 using PatchLinks = std::vector<std::array<EdgeLink, 4>>;
 
 // Parameters of the point at `t` in [0,1] of an edge (numbered as in EdgeLink).
-Vec2 edge_parameters(int edge, double t);
+inline Vec2 edge_parameters(int edge, double t) {
+  const double end = edge % 2;
+  return edge < 2 ? Vec2(end, t) : Vec2(t, end);
+}
 
-// The other end of a link: the parameter `t` of an edge as counted on its partner.
+// The other end of a link: the parameter `t` of an edge as counted on its partner. Two rational curves that
+// are the same curve differ by such a map, unless one runs through it twice (or is straight): those links are
+// `projected`, and this is a guess.
 inline double partner_parameter(const EdgeLink& link, double t) {
-  return link.reversed ? 1 - t : t;
+  const double s = link.reversed ? 1 - t : t;
+  return link.ratio == 1 ? s : link.ratio * s / (1 + (link.ratio - 1) * s);
+}
+
+// The same where the parameter has to be looked for: that of the point of the partner's edge closest to x.
+double projected_parameter(const BezierPatch& partner, const EdgeLink& link, const Vec3& x);
+
+// The point `at` on edge `edge` of its patch as the patch across that edge, which `link` names, sees it.
+inline SurfacePoint across(const std::vector<BezierPatch>& patches, const EdgeLink& link,
+                           const SurfacePoint& at, int edge) {
+  const double t = edge < 2 ? at.v : at.u;
+  const Vec2 there = edge_parameters(
+      link.edge, link.projected ? projected_parameter(patches[link.patch], link,
+                                                      evaluate0(patches[at.patch], at.u, at.v))
+                                : partner_parameter(link, t));
+  return {link.patch, there[0], there[1]};
 }
 
 struct UnmatchedEdge {
@@ -27,8 +47,9 @@ struct UnmatchedEdge {
 
 // Pairs the edges of `patches` whose curves agree within `tolerance` (length), closest pairs first; an edge
 // whose control points all lie within the tolerance is collapsed. Curves are compared as curves, so the two
-// sides may be parametrised differently; the whole of one edge must lie on the whole of the other (no
-// T-junctions). O(n log n) for n patches. Returns the first edge left over, if any.
+// sides may be parametrised differently: the map between them goes into the link; the whole of one edge must
+// lie on the whole of the other (no T-junctions). O(n log n) for n patches. Returns the first edge left over,
+// if any.
 UnmatchedEdge connect_patches(const std::vector<BezierPatch>& patches, double tolerance, PatchLinks& links);
 
 // The worst of a body's joints.
@@ -37,12 +58,15 @@ struct KinkSummary {
   double depth = 0;                // of the deepest groove that the convex hull bridges at a concave kink
   SurfacePoint deepest;            // where that is
   double excess = 0;               // how far one side of such a groove rises above the other's tangent plane
+  double gap = 0;                  // no two sides of a joint, and no points of a pole, are further apart
 };
 
-// Fills EdgeLink::kink from the normals on both sides, which must be consistently oriented. On a collapsed
-// edge the kink is how far the normals around the pole spread from each other. A groove's depth is that below
-// the common tangent of the two sides, taken as arcs of their curvatures k across the edge: kink^2 / (2
-// (sqrt(k_a) + sqrt(k_b))^2), never more than that of two straight sides a patch wide.
+// Fills EdgeLink::kink, kink_bound and gap from the normals on both sides, which must be consistently
+// oriented. On a collapsed edge the kink is how far the normals around the pole spread from each other.
+// Angles are the largest of kKinkSamples, `convex` and `concave` never below what joints.h proves once that
+// is a kink. A groove's depth is that below the common tangent of the two sides, taken as arcs of their
+// curvatures k across the edge: kink^2 / (2 (sqrt(k_a) + sqrt(k_b))^2), never more than that of two straight
+// sides a patch wide.
 KinkSummary measure_kinks(const std::vector<BezierPatch>& patches, PatchLinks& links);
 
 // For each surface, whether it must be turned (u and v exchanged) to agree with the first surface of its

@@ -227,12 +227,27 @@ const SurfaceSample& most_concave(const std::vector<SurfaceSample>& samples) {
                            [&](const SurfaceSample& a, const SurfaceSample& b) { return bend(a) < bend(b); });
 }
 
+// The leaf that bends inward most for its size, if any does by more than round-off.
+const Leaf* most_concave(const std::vector<Leaf>& leaves, double size) {
+  const Leaf* worst = nullptr;
+  double most = 0;
+  for (const Leaf& leaf : leaves) {
+    const CellBounds& b = leaf.bounds;
+    if (b.convex || !(b.seen_curvature < -kCurvatureNoise / size)) continue;
+    const double bend = b.seen_curvature * leaf.cell.du * leaf.cell.dv;
+    if (bend < most) most = bend, worst = &leaf;
+  }
+  return worst;
+}
+
 }  // namespace
 
-Dent find_dent(const Shape& shape, const std::vector<SurfaceSample>& samples, const KinkSummary& kinks) {
+Dent find_dent(const Shape& shape, const std::vector<SurfaceSample>& samples, const std::vector<Leaf>& leaves,
+               const KinkSummary& kinks) {
   const double size = shape.bounding_radius;
+  const Leaf* inward = most_concave(leaves, size);
   const SurfaceSample& concave = most_concave(samples);
-  const bool suspect = kinks.concave > kNoKink || concave.k_min < -kCurvatureNoise / size;
+  const bool suspect = inward || kinks.concave > kNoKink || concave.k_min < -kCurvatureNoise / size;
   const Clouds clouds = choose(samples, suspect ? kPairsIfDented : kPairsIfConvex);
   const std::vector<double> support = sampled_support(clouds), depth = sampled_depth(clouds, support);
   std::vector<double> excess = support;
@@ -249,8 +264,9 @@ Dent find_dent(const Shape& shape, const std::vector<SurfaceSample>& samples, co
   const Clouds starts = choose(samples, kDentStarts);
   const Probe probe(shape, starts, step);
   SurfacePoint where;
-  const std::vector<SurfacePoint> places = {clouds.places[highest], clouds.places[deepest], concave.where,
-                                            kinks.deepest};
+  std::vector<SurfacePoint> places = {clouds.places[highest], clouds.places[deepest], concave.where,
+                                      kinks.deepest};
+  if (inward) places.push_back(inward->middle);
   dent.excess =
       std::max(dent.excess, worst_of([&](const auto& at) { return probe.excess(at); }, places, step, where));
   const double found = worst_of([&](const auto& at) { return probe.depth(at); }, places, step, where);

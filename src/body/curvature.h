@@ -1,4 +1,4 @@
-// A dense sample of a body's surface, and bounds on its curvature from it.
+// A dense sample of a body's surface, and what kinks do to the bounds of its curvature.
 #pragma once
 
 #include <vector>
@@ -17,13 +17,6 @@ struct SurfaceSample {
 
 // A square grid on every patch, edges included: about 3,000 points in all, at least 4 x 4 a patch.
 std::vector<SurfaceSample> sample_surface(const std::vector<BezierPatch>& patches);
-
-// Curvature bounds inside the patches (joints left out). The extreme sample of every patch is refined by a
-// pattern search, then widened by a tenth of the difference to its neighbours on the grid plus 1e-6: safe
-// when curvature is resolved by the grid (a feature narrower than 1/20 of a six-patch body's patch can be
-// missed). Not a proof.
-CurvatureBounds bound_patch_curvature(const std::vector<BezierPatch>& patches,
-                                      const std::vector<SurfaceSample>& samples);
 
 // The strict bounds of the whole body's convex hull: an opening kink is a crease (radius 0), a closing one is
 // bridged by a flat strip (infinite radius). Kinks up to kNoKink count as none. Imperfect joints therefore

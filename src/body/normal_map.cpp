@@ -1,4 +1,4 @@
-// Adaptive quads of every patch, and the kinked joints, painted onto the cube map; see normal_map.h.
+// Leaves of every patch, and the kinked joints, painted onto the cube map; see normal_map.h.
 #include "body/normal_map.h"
 
 #include <algorithm>
@@ -6,9 +6,9 @@
 
 #include "body/connectivity.h"
 #include "body/cube_map.h"
-#include "body/curvature.h"
 #include "body/local_form.h"
 #include "body/shape.h"
+#include "body/surface_bounds.h"
 #include "nurbs/tolerances.h"
 
 namespace nurbs {
@@ -33,46 +33,48 @@ void paint(const Vec3& center, double angle, double radius, NormalMap& map) {
     }
 }
 
+// The same for caps of any width.
+void paint_wide(const Vec3& center, double angle, double radius, NormalMap& map) {
+  const float value = std::nextafter(static_cast<float>(radius), std::numeric_limits<float>::infinity());
+  const double cell_angle = 1.5 / map.cells;  // half a cell's diagonal, at most
+  for (int face = 0; face < 6; ++face)
+    for (int i = 0; i < map.cells; ++i)
+      for (int j = 0; j < map.cells; ++j) {
+        Vec3 d;
+        d[face / 2] = face % 2 ? -1 : 1;
+        d[(face / 2 + 1) % 3] = (2.0 * i + 1) / map.cells - 1;
+        d[(face / 2 + 2) % 3] = (2.0 * j + 1) / map.cells - 1;
+        if (angle_between(d, center) > angle + cell_angle) continue;
+        float& cell = map.radius[(face * map.cells + i) * map.cells + j];
+        cell = std::max(cell, value);
+      }
+}
+
 class Painter {
  public:
-  Painter(const Shape& shape, NormalMap& map)
-      : shape_(shape), map_(map), flat_(kCurvatureNoise / shape.bounding_radius) {}
+  Painter(const Shape& shape, NormalMap& map) : shape_(shape), map_(map) {}
 
-  void paint_patches() {
-    for (size_t p = 0; p < shape_.patches.size(); ++p)
-      for (int i = 0; i < kNormalQuads; ++i)
-        for (int j = 0; j < kNormalQuads; ++j) paint_quad(shape_.patches[p], i, j, kNormalQuads, 0);
+  void paint_leaf(const Leaf& leaf) {
+    const CellBounds& b = leaf.bounds;
+    const double radius = b.convex ? b.max_radius : kInfinity;
+    const double angle = b.regular ? b.cone + kNormalMargin : kInfinity;
+    if (angle <= kNormalCap)
+      paint(b.axis, angle, radius, map_);
+    else
+      paint_wide(b.axis, angle, radius, map_);
   }
 
-  void paint_kinks() {
+  void paint_joints() {
+    const double gap = kJointRoundoff * shape_.bounding_radius;
     for (size_t p = 0; p < shape_.patches.size(); ++p)
-      for (int e = 0; e < 4; ++e)
-        if (std::abs(shape_.links[p][e].kink) > kNoKink) paint_joint(static_cast<int>(p), e);
+      for (int e = 0; e < 4; ++e) {
+        const EdgeLink& link = shape_.links[p][e];
+        if (std::abs(link.kink) > kNoKink || link.kink_bound > kNoKink || link.gap > gap)
+          paint_joint(static_cast<int>(p), e);
+      }
   }
 
  private:
-  // Quad (i, j) of a patch cut into n x n.
-  void paint_quad(const BezierPatch& patch, int i, int j, int n, int depth) {
-    static constexpr double kAt[5][2] = {{0.5, 0.5}, {0, 0}, {1, 0}, {0, 1}, {1, 1}};
-    Vec3 normal[5];
-    double least = kInfinity, largest = 0, spread = 0;
-    for (int k = 0; k < 5; ++k) {
-      const LocalForm form = local_form(patch, (i + kAt[k][0]) / n, (j + kAt[k][1]) / n);
-      normal[k] = form.normal;
-      const double radius = form.k_min > flat_ ? 1 / form.k_min : kInfinity;
-      least = std::min(least, radius);
-      largest = std::max(largest, radius);
-      spread = std::max(spread, angle_between(normal[0], normal[k]));
-    }
-    const bool even = largest <= kEvenRadius * least;  // infinity <= infinity: all flat or dented
-    if ((spread > kNormalQuadAngle || !even) && depth < kNormalDepth) {
-      for (int k = 0; k < 4; ++k) paint_quad(patch, 2 * i + k / 2, 2 * j + k % 2, 2 * n, depth + 1);
-      return;
-    }
-    const double radius = even ? kRadiusSafety * largest : largest * (largest / least);
-    paint(normal[0], kCapSafety * spread + kNormalMargin, radius, map_);
-  }
-
   // The normals of both sides and those between.
   void paint_joint(int patch, int edge) {
     const EdgeLink& link = shape_.links[patch][edge];
@@ -83,8 +85,8 @@ class Painter {
       const Vec3 here = local_form(shape_.patches[patch], at[0], at[1]).normal;
       Vec3 there = here;
       if (link.patch >= 0) {
-        const Vec2 other = edge_parameters(link.edge, partner_parameter(link, t));
-        there = local_form(shape_.patches[link.patch], other[0], other[1]).normal;
+        const SurfacePoint other = across(shape_.patches, link, {patch, at[0], at[1]}, edge);
+        there = local_form(shape_.patches[link.patch], other.u, other.v).normal;
       }
       const Vec3 middle = (here + there).normalized();
       const double step = k > 0 ? angle_between(before, middle) : 0;
@@ -96,7 +98,6 @@ class Painter {
 
   const Shape& shape_;
   NormalMap& map_;
-  double flat_;  // curvatures up to this are none
 };
 
 }  // namespace
@@ -108,15 +109,17 @@ double NormalMap::radius_at(const Vec3& n) const {
   return radius[(c.face * cells + cube_cell(c.a, cells)) * cells + cube_cell(c.b, cells)];
 }
 
-NormalMap make_normal_map(const Shape& shape) {
+NormalMap make_normal_map(const Shape& shape, SurfaceBounds* bounds) {
   NormalMap map;
   if (!shape.dented() && shape.patch_curvature.max_radius <= kLongRadius * shape.bounding_radius) return map;
   map.cells = kNormalCells;
   map.radius.assign(6u * kNormalCells * kNormalCells, 0);
   Painter painter(shape, map);
-  painter.paint_patches();
-  painter.paint_kinks();
-  for (float& radius : map.radius)  // a cell no normal was seen in: sharper than the samples
+  const int patches = static_cast<int>(shape.patches.size());
+  refine_normals(kNormalLeafAngle, kEvenRadius, kMostNormalCells + kMostCellsPerPatch * patches, bounds);
+  for (const Leaf& leaf : bounds->leaves) painter.paint_leaf(leaf);
+  painter.paint_joints();
+  for (float& radius : map.radius)  // a cell that no normal reaches: on a crease
     if (radius == 0) radius = std::numeric_limits<float>::infinity();
   return map;
 }

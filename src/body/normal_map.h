@@ -11,6 +11,7 @@
 namespace nurbs {
 
 struct Shape;
+struct SurfaceBounds;
 
 // Cells of a cube map. With r = radius_at(n) finite, no dent, crease or flat has a normal within
 // kNormalMargin of n, and every curvature radius whose normal lies there is at most r. So the surface point x
@@ -26,9 +27,9 @@ struct NormalMap {
 };
 
 // Of a shape whose patches, links, bounds, dents and curvatures are done, if it has dents or its largest
-// curvature radius exceeds kLongRadius bounding radii; empty for others. From samples on an adaptive grid,
-// widened by a tenth; kinked joints are marked as infinite. Not a proof, as the curvature bounds it replaces.
-// Some ms, 100 kB.
-NormalMap make_normal_map(const Shape& shape);
+// curvature radius exceeds kLongRadius bounding radii; empty for others. From the leaves of `bounds`, whose
+// normals and radii are proven, halved further; cells that no leaf's normals reach are infinite, and so are
+// the normals at kinked or gaping joints, which are sampled and widened. Some ms to some tens of ms, 100 kB.
+NormalMap make_normal_map(const Shape& shape, SurfaceBounds* bounds);
 
 }  // namespace nurbs

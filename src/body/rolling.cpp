@@ -14,17 +14,21 @@ namespace {
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 // Least length of surface crossed per unit of u (and of v), square to the other parameter line.
-std::array<double, 2> least_speed(const BezierPatch& patch) {
+std::array<double, 2> least_speed(const PatchRate& patch) {
   std::array<double, 2> least{kInfinity, kInfinity};
-  for (int i = 0; i <= kSpeedSamples; ++i)
-    for (int j = 0; j <= kSpeedSamples; ++j) {
-      const Jet1 jet = evaluate1(patch, double(i) / kSpeedSamples, double(j) / kSpeedSamples);
-      const double area = jet.su.cross(jet.sv).norm(), lu = jet.su.norm(), lv = jet.sv.norm();
-      least[0] = std::min(least[0], lv > 0 ? area / lv : 0);
-      least[1] = std::min(least[1], lu > 0 ? area / lu : 0);
-    }
-  return {kSpeedSafety * least[0], kSpeedSafety * least[1]};
+  for (const PatchRate::Cell& cell : patch.cells) {
+    least[0] = std::min<double>(least[0], cell.speed_u);
+    least[1] = std::min<double>(least[1], cell.speed_v);
+  }
+  return least;
 }
+
+// Ball that touches where the surface covers a disc of radius `cover` of the tangent plane.
+double inscribed(const Shape& shape, double cover) {
+  return cover * shape.inner_radius / (cover + shape.bounding_radius);
+}
+
+constexpr double kSineOfOne = 0.84;
 
 }  // namespace
 
@@ -32,15 +36,16 @@ JointDistance measure_joint_distance(const Shape& shape) {
   JointDistance joints;
   joints.width = kInfinity;
   for (size_t p = 0; p < shape.patches.size(); ++p) {
-    const std::array<double, 2> least = least_speed(shape.patches[p]);
+    const std::array<double, 2> least = least_speed(shape.rates[p]);
     std::array<double, 4> speed;
     for (int edge = 0; edge < 4; ++edge) {
-      const double kink = shape.links[p][edge].kink;
-      const bool kinked = std::abs(kink) > kNoKink;
+      const EdgeLink& link = shape.links[p][edge];
+      const double angle = std::max(std::abs(link.kink), link.kink_bound);
+      const bool kinked = angle > kNoKink;
       speed[edge] = kinked ? least[edge / 2] : kInfinity;
       if (kinked)
-        (kink > 0 ? joints.convex : joints.concave) =
-            std::max(kink > 0 ? joints.convex : joints.concave, std::abs(kink));
+        (link.kink > 0 ? joints.convex : joints.concave) =
+            std::max(link.kink > 0 ? joints.convex : joints.concave, angle);
     }
     joints.width = std::min({joints.width, least[0], least[1]});
     joints.speed.push_back(speed);
@@ -59,12 +64,18 @@ RollingRadii rolling_radii(const Shape& shape, const SurfacePoint& at, const Vec
   const double parameter[4] = {at.u, 1 - at.u, at.v, 1 - at.v};
   for (int edge = 0; edge < 4; ++edge)
     if (speed[edge] < kInfinity) s = std::min(s, speed[edge] * std::max(0.0, parameter[edge]));
-  RollingRadii radii{0.5 * patch.min_radius, patch.max_radius, shape.support_excess, near};
-  if (joints.convex > 0) radii.inner = std::min(radii.inner, 0.25 * s / joints.convex);
+  const double r0 = patch.min_radius;
+  RollingRadii radii{std::min(r0, inscribed(shape, kSineOfOne * std::min(s, r0))), patch.max_radius,
+                     shape.support_excess, near};
+  if (joints.convex <= kSmallKink) {
+    double across_kinks = std::min(0.5 * r0, inscribed(shape, kSineOfOne * std::min(joints.width, r0)));
+    if (joints.convex > 0) across_kinks = std::min(across_kinks, 0.25 * s / joints.convex);
+    radii.inner = std::max(radii.inner, across_kinks);
+  }
   if (joints.concave > 0) {
     const bool clear = s >= patch.max_radius * joints.concave;
     radii.outer = clear ? 2 * patch.max_radius : kInfinity;
-    if (clear) radii.slack = 0;
+    if (clear) radii.slack = shape.joint_slack;
   }
   return radii;
 }

@@ -13,7 +13,7 @@ namespace nurbs {
 struct Shape;
 
 // How far a point is from the nearest kinked joint, at least: per patch and edge the length of surface
-// crossed per unit of parameter, infinite where the joint is smooth.
+// crossed per unit of parameter (proven), infinite where the joint is smooth.
 struct JointDistance {
   std::vector<std::array<double, 4>> speed;
   double width = 0;    // least width of a patch: no kinked joint beyond a smooth one is nearer than this
@@ -42,12 +42,27 @@ inline double rolling_excess(double outer, double bounding_radius, double chord2
 // Of a shape whose patches and links, with their kinks, are done.
 JointDistance measure_joint_distance(const Shape& shape);
 
-// Let r0 and P0 be the least and largest curvature radius inside the patches and s the distance to the
-// nearest kinked joint. Without kinks the radii are r0 and P0 (Blaschke). Otherwise, in a normal section, the
-// ball of radius r <= r0/2 drops s^2/(2r) below the tangent plane and the surface at most s^2/(2 r0) + kink
-// (s' - s) beyond the joint, so r <= s/kink suffices; a quarter of that is used, for corners where several
-// joints meet. Likewise a closing kink stays inside the ball of radius 2 P0 once s >= P0 kink; nearer, the
-// surface may rise by shape.support_excess. `near` is the normal map's. A few ns.
+// Let r0 and P0 be the least and largest curvature radius inside the patches, s the distance to the nearest
+// kinked joint, I and O the inner and bounding radius about the body's centre c.
+//
+// Without kinks the radii are r0 and P0: Blaschke's rolling theorem, whose hypotheses are a closed convex
+// surface with continuous normals and all curvature radii in [r0, P0]. Normals that jump by up to kNoKink
+// move it by the square of that.
+//
+// With kinks, a ball of radius r that touches at x lies in the body K if K's surface over the disc of radius
+// r of the tangent plane at x is above it, and r <= t I / (t + O) for some t >= r such that it covers the
+// disc of radius t. For, with l = t / (t + O), K holds (1 - l) y + l z for y over that disc and z in the ball
+// (c, I), so by choice of y, which makes up for c's offset to the side, a ball of radius l I below x, at
+// least as deep as it is wide; with the surface above, K holds the cylinder between. Two ways to meet the
+// hypotheses, the better one is used:
+//   * no kinked joint within s: the surface is above a ball of radius r0 there, and covers a disc of t = r0
+//     sin(s / r0) >= 0.84 min(s, r0); r = min(r0, t I / (t + O)). True for creases of any angle.
+//   * small kinks (kSmallKink): up to the width of a patch, four are crossed at most (four patches meet in a
+//     corner: not checked). In a normal section the ball of radius r <= r0/2 drops v^2 / (2 r) below the
+//     tangent plane at distance v and the surface at most v^2 / (2 r0) + 4 kink (v - s), so r <= s / (4 kink)
+//     suffices; and t as above with the width for s.
+// Likewise a closing kink stays inside the ball of radius 2 P0 once s >= P0 kink; nearer, the surface may
+// rise by shape.support_excess. `near` is the normal map's. A few ns.
 RollingRadii rolling_radii(const Shape& shape, const SurfacePoint& at, const Vec3& normal);
 
 }  // namespace nurbs

@@ -8,8 +8,8 @@
 #include "body/bounds.h"
 #include "body/connectivity.h"
 #include "body/convexity.h"
-#include "body/curvature_rate.h"
 #include "body/mass_properties.h"
+#include "body/surface_bounds.h"
 #include "nurbs/tolerances.h"
 
 namespace nurbs {
@@ -180,9 +180,40 @@ void judge_dent(Draft& draft, const Dent& dent) {
   }
 }
 
-CurvatureBounds inside_patches(const Shape& s, const std::vector<SurfaceSample>& samples) {
-  if (s.inner_radius >= (1 - kSphere) * s.bounding_radius) return {s.bounding_radius, s.bounding_radius};
-  return bound_patch_curvature(s.patches, samples);
+bool is_sphere(const Shape& s) {
+  return s.inner_radius >= (1 - kSphere) * s.bounding_radius;
+}
+
+// What is within kSphere of a sphere is treated as one: its curvature does not change.
+void take_as_sphere(const Shape& s, SurfaceBounds* bounds) {
+  bounds->radii = {s.bounding_radius, s.bounding_radius};
+  for (PatchRate& patch : bounds->rates)
+    for (PatchRate::Cell& cell : patch.cells)
+      if (std::isfinite(cell.rate)) cell.rate = static_cast<float>(kSphere * s.bounding_radius);
+}
+
+Proofs summarise(const Shape& s, const SurfaceBounds& bounds, const KinkSummary& kinks) {
+  Proofs proofs;
+  for (const Leaf& leaf : bounds.leaves) {
+    const double share = leaf.cell.du * leaf.cell.dv / static_cast<double>(s.patches.size());
+    if (is_flat(leaf.bounds, s.bounding_radius))
+      proofs.flat_share += share;
+    else if (!leaf.bounds.convex)
+      proofs.unproven_share += share;
+  }
+  proofs.convex = proofs.unproven_share == 0;
+  proofs.seen_min = bounds.seen_min;
+  proofs.seen_max = bounds.seen_max;
+  proofs.seen_rate = bounds.seen_rate;
+  for (const PatchRate& patch : bounds.rates)
+    for (const PatchRate::Cell& cell : patch.cells)
+      if (std::isfinite(cell.rate)) proofs.rate = std::max<double>(proofs.rate, cell.rate);
+  proofs.cells = bounds.cells;
+  proofs.joint_gap = kinks.gap;
+  proofs.opening = kinks.convex;
+  proofs.closing = kinks.concave;
+  proofs.sphere = is_sphere(s);
+  return proofs;
 }
 
 // The body's size, form and search tables. Each needs some of those above it.
@@ -193,16 +224,19 @@ void measure(Draft& draft) {
   s.inner_radius = radius.inner;
   const KinkSummary kinks = measure_kinks(s.patches, s.links);
   s.smooth = std::max(kinks.convex, kinks.concave) <= kSmoothKink;
-  const std::vector<SurfaceSample> samples = sample_surface(s.patches);
-  const Dent dent = find_dent(s, samples, kinks);
+  if (kinks.gap > kJointRoundoff * s.bounding_radius) s.joint_slack = kGapsCrossed * kinks.gap;
+  SurfaceBounds bounds = bound_surface(s, is_sphere(s));
+  if (is_sphere(s)) take_as_sphere(s, &bounds);
+  s.proofs = summarise(s, bounds, kinks);
+  s.patch_curvature = bounds.radii;
+  s.curvature = add_kinks(s.patch_curvature, kinks);
+  const Dent dent = find_dent(s, sample_surface(s.patches), bounds.leaves, kinks);
   judge_dent(draft, dent);
   s.concavity = dent.depth;
-  s.support_excess = dent.excess;
-  s.patch_curvature = inside_patches(s, samples);
-  s.curvature = add_kinks(s.patch_curvature, kinks);
-  for (const BezierPatch& patch : s.patches) s.curvature_rate.push_back(bound_curvature_rate(patch));
+  s.support_excess = dent.excess + s.joint_slack;
+  s.rates = std::move(bounds.rates);
   s.joints = measure_joint_distance(s);
-  s.normal_map = make_normal_map(s);
+  s.normal_map = make_normal_map(s, &bounds);
   s.atlas = make_atlas(s, kAtlasCells);
 }
 

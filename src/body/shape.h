@@ -30,8 +30,12 @@ struct EdgeLink {
   int edge = -1;           // its edge
   bool reversed = false;   // the free parameter runs the other way there
   bool collapsed = false;  // the edge is a single point (a pole)
+  bool projected = false;  // the other side's parameter has no closed form: the closest point's is taken
+  double ratio = 1;        // otherwise it is r t / (1 + (r - 1) t), t counted as `reversed` says
+  double gap = 0;          // bound of the distance of the two sides at these parameters, length
   double kink = 0;  // largest angle between the two normals along the edge, rad; > 0 opens (convex), < 0 is
                     // concave; on a collapsed edge: between the normals around the pole (0 where smooth)
+  double kink_bound = 0;  // no angle between two normals there is larger than this, rad: proven
 };
 
 struct MassProperties {  // of the uniform solid of unit density, at scale 1
@@ -42,10 +46,42 @@ struct MassProperties {  // of the uniform solid of unit density, at scale 1
 
 // Radii of curvature over the whole surface: every normal curvature lies in [1/max_radius, 1/min_radius].
 // min_radius is 0 for a body with a convex crease or corner; max_radius is infinite for one with a flat part.
-// Conservative: sampled, refined and widened, see curvature.h.
+// Proven, see surface_bounds.h.
 struct CurvatureBounds {
   double min_radius = 0;
   double max_radius = 0;
+};
+
+// How fast a patch's curvature changes, over a grid of kRateCells^2 rectangles of its parameters. Proven; see
+// surface_bounds.h.
+struct PatchRate {
+  struct Cell {
+    float rate = std::numeric_limits<float>::infinity();  // |dW/dn| is at most this here and in the cells
+                                                          // around, W the map from turns of the normal to
+                                                          // displacements; a length
+    float speed_u = 0, speed_v = 0;  // a path there that changes u by du is at least speed_u |du| long
+  };
+  std::vector<Cell> cells;  // v fastest
+};
+
+// At a surface point: the rate holds as long as the point moves by less than `room`, a length. Infinite and 0
+// where nothing is proven: at poles, flats, inflections.
+struct LocalRate {
+  double rate, room;
+};
+LocalRate rate_near(const PatchRate& patch, const SurfacePoint& at);
+
+// What is proven of a body, and how tightly: for reports (nurbs-shape check).
+struct Proofs {
+  bool convex = false;        // no negative curvature inside the patches
+  double flat_share = 0;      // of the patches' parameters: no curvature one way, to round-off
+  double unproven_share = 0;  // ... curvature neither proven positive nor flat: dents, inflections, tips
+  double seen_min = 0, seen_max = 0;  // curvature radii that occur, beside patch_curvature's bounds
+  double rate = 0, seen_rate = 0;     // largest finite LocalRate::rate, and one that occurs
+  int cells = 0;                      // enclosed
+  double joint_gap = 0;               // no two sides of a joint are further apart, length
+  double opening = 0, closing = 0;    // no two normals at a joint make a larger angle, rad
+  bool sphere = false;                // within kSphere of one
 };
 
 struct Shape {
@@ -67,10 +103,13 @@ struct Shape {
   double concavity = 0;                    // depth of the deepest dent bridged by the convex hull, length
   double support_excess = 0;               // what a local maximum of d . x over the surface may lack of the
                                            // support function h(d): 0 if convex, see convexity.h
+  double joint_slack = 0;                  // what gaps at joints add to that and to its certificates; 0 where
+                                           // the sides meet to round-off
   bool smooth = true;                      // no kink above kSmoothKink: normals are continuous
   CurvatureBounds curvature;               // of the body; any kink above 1e-7 rad makes it (0, infinity)
   CurvatureBounds patch_curvature;         // of the patches alone, joints left out
-  std::vector<double> curvature_rate;      // per patch, bound of |dW/dn|: curvature_rate.h
+  std::vector<PatchRate> rates;            // per patch
+  Proofs proofs;                           // how far the bounds above are proven, and how tight
   JointDistance joints;                    // to kinked joints: where the patch curvatures hold for the body
   NormalMap normal_map;                    // local bounds, for bodies with flats or dents
   DirectionAtlas atlas;

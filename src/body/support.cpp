@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "body/connectivity.h"
 #include "nurbs/tolerances.h"
 
 namespace nurbs {
@@ -17,16 +18,6 @@ bool pins_u(int edge) {
 }
 double pinned_value(int edge) {
   return (edge == 1 || edge == 3) ? 1.0 : 0.0;
-}
-
-// The same surface point seen from the patch across `edge`. `t` is the free parameter along the edge.
-SurfacePoint across(const EdgeLink& link, double t) {
-  SurfacePoint q;
-  q.patch = link.patch;
-  const double free = link.reversed ? 1.0 - t : t;
-  (pins_u(link.edge) ? q.u : q.v) = pinned_value(link.edge);
-  (pins_u(link.edge) ? q.v : q.u) = free;
-  return q;
 }
 
 // Slope of f along the unit tangent pointing into the patch from one of its edges.
@@ -270,7 +261,7 @@ Support climb(const Shape& shape, const Vec3& d, SurfacePoint at) {
         ++polar_restarts;
         moved = true;
       } else if (link.patch >= 0) {
-        q = across(link, pins_u(edge) ? at.v : at.u);
+        q = across(shape.patches, link, at, edge);
         const Jet1 there = evaluate1(shape.patches[q.patch], q.u, q.v);
         moved = ascends_into(there, q, link.edge, d);
       }
@@ -382,7 +373,7 @@ SurfacePoint walk(const Shape& shape, SurfacePoint at, double du, double dv) {
     // The rest of the step, as a tangent vector, in the neighbour's parameters.
     const Jet1 here = evaluate1(shape.patches[at.patch], at.u, at.v);
     const Vec3 rest = (1 - fraction) * (du * here.su + dv * here.sv);
-    at = across(link, pins_u(edge) ? at.v : at.u);
+    at = across(shape.patches, link, at, edge);
     const Jet1 there = evaluate1(shape.patches[at.patch], at.u, at.v);
     const double e = there.su.squaredNorm(), f = there.su.dot(there.sv), g = there.sv.squaredNorm();
     const double area2 = e * g - f * f;

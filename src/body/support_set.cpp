@@ -17,12 +17,6 @@ constexpr double kStraightOn = 1e-8;   // rad, between the pieces of a line, and
 constexpr int kMostPieces = 16;        // patches that a line may cross to each side
 constexpr double kFaceCosine = 0.5;    // a face further away than 60 degrees is not asked
 
-// The same point seen through an edge on which it lies, `t` along it.
-SurfacePoint beyond(const EdgeLink& link, double t) {
-  const Vec2 at = edge_parameters(link.edge, partner_parameter(link, t));
-  return {link.patch, at[0], at[1]};
-}
-
 // Edge of a patch that ends its rulings, low or high.
 int end_edge(Ruling ruling, bool high) {
   return (ruling == Ruling::along_u ? 0 : 2) + (high ? 1 : 0);
@@ -51,7 +45,7 @@ Vec3 follow(const Shape& shape, SurfacePoint at, bool high) {
     if (next == Ruling::none) return end;
     const bool starts_low = link.edge == end_edge(next, false);
     if (!starts_low && link.edge != end_edge(next, true)) return end;
-    const SurfacePoint there = beyond(link, along_u ? last.v : last.u);
+    const SurfacePoint there = across(shape.patches, link, last, edge);
     SurfacePoint far = there;
     (next == Ruling::along_u ? far.u : far.v) = starts_low ? 1 : 0;
     const Vec3 on = evaluate0(shape.patches[far.patch], far.u, far.v) - end;
@@ -94,7 +88,7 @@ bool ruled_line(const Shape& shape, const SurfacePoint& at, const Vec3& d, doubl
     const double off = edge == 0 ? at.u : edge == 1 ? 1 - at.u : edge == 2 ? at.v : 1 - at.v;
     const EdgeLink& link = shape.links[at.patch][edge];
     if (off > kBesideJoint || link.patch < 0 || link.collapsed) continue;
-    try_at(beyond(link, edge < 2 ? at.v : at.u));
+    try_at(across(shape.patches, link, at, edge));
   }
   return best > -std::numeric_limits<double>::infinity();
 }

@@ -1,18 +1,19 @@
 // The certificate: rigorous bounds on the gap from one pair of surface points, whatever way they were found.
 //
-// Let every normal curvature radius of body K lie in [rho_K, P_K] (near kinked joints: body/rolling.h).
-// By Blaschke's rolling theorem a ball of radius rho_K rolls freely inside K, and K rolls freely inside a
-// ball of radius P_K. Hence, for a on A with outward normal na and b on B with nb:
-//   * a' = a - rho_A na and b' = b - rho_B nb lie in the inner parallel bodies ("cores") of A and B. As
-//     h_K = h_core + rho_K |d|, the gap is the signed distance of the cores less rho_A + rho_B, so
-//         gap <= |b' - a'| - rho_A - rho_B.
-//     For overlaps shallower than rho_A + rho_B the cores are disjoint convex bodies: the minimiser is
-//     unique, and a stationary pair is the global answer.
-//   * A lies in the ball of radius P_A that touches at a, so h_A(d) <= d.a + P_A (1 - d.na), likewise B, and
+// Theorem. Let A and B be convex, a on A with outward unit normal na and b on B with nb, such that
+//   (1) a ball of radius rho_A that touches at a lies in A, likewise B;
+//   (2) h_A(d) <= d.a + P_A (1 - d.na) for the d used below, likewise B: A is in a ball that touches at a.
+// Then, with a' = a - rho_A na and b' = b - rho_B nb,
+//         gap <= |b' - a'| - rho_A - rho_B,
+// the gap of the two balls in A and B, which is no smaller than A's and B's; and
 //         gap >= -p(d) >= d.(b - a) - P_A (1 - d.na) - P_B (1 + d.nb)      for every unit d.
 // With d = (b' - a') / |b' - a'| the bracket is (P_A - rho_A)(1 - d.na) + (P_B - rho_B)(1 + d.nb) wide:
-// quadratic in the angles between the normals and d, and zero for spheres at once. On bodies with flats or
-// dents the normal map gives a smaller P_K, with no allowance for the dents, that holds near the normal.
+// quadratic in the angles between the normals and d, and zero for spheres at once. At a stationary pair (na =
+// -nb = d* along b' - a') with an overlap below rho_A + rho_B both bounds are the overlap: it is the global
+// minimum, whatever other stationary pairs there are. Radii of the whole body are not needed for that, only
+// (1) at these two points. Where (1) and (2) come from, and under which conditions: body/rolling.h; on bodies
+// with flats or dents the normal map gives a smaller P_K, with no allowance for the dents, that holds near
+// the normal. Sides of a joint that do not meet (Shape::joint_slack) widen both bounds.
 #pragma once
 
 #include <algorithm>
@@ -72,7 +73,8 @@ inline Bracket certify(const PairFrame& pair, const PointPair& p) {
     return radii.slack > kRoundoff * shape.bounding_radius && !(radii.near < kFarAway);
   };
   bracket.dented = dented(*pair.a, radii_a) || dented(*pair.b, radii_b);
-  bracket.upper = distance - rho_a - rho_b + roundoff;
+  const double slack = pair.scale_a * pair.a->joint_slack + pair.scale_b * pair.b->joint_slack;
+  bracket.upper = distance - rho_a - rho_b + slack + roundoff;
   bracket.lower = d.dot(p.b - p.a) - support_excess(*pair.a, pair.scale_a, radii_a, d, p.na) -
                   support_excess(*pair.b, pair.scale_b, radii_b, -d, p.nb) - roundoff;
   return bracket;

@@ -7,11 +7,12 @@
 #include "nurbs/tolerances.h"
 
 namespace nurbs {
-bool make_support_model(const Mat3& axes, const Vec3& center, const SurfacePoint& at, const JetLanes& jet,
-                        double rate, SupportModel* model) {
+bool make_support_model(const Mat3& axes, const Vec3& center, const JetLanes& jet, const LocalRate& local,
+                        SupportModel* model) {
+  if (!(local.rate < kFarAway)) return false;
   using Slot = JetLanes::Slot;
   const Vec3 su = jet.at(Slot::kSu), sv = jet.at(Slot::kSv), cross = su.cross(sv);
-  const double area = cross.norm(), lu = su.norm(), lv = sv.norm();
+  const double area = cross.norm(), lu = su.norm();
   if (!(area > 0)) return false;
   const Vec3 n = cross / area, t = su / lu, s = n.cross(t);
   Lane8 bend;
@@ -24,15 +25,12 @@ bool make_support_model(const Mat3& axes, const Vec3& center, const SurfacePoint
   model->w0 = lu * across + shear * along;
   model->w1 = height * along;
   model->w2 = r * height * height * l;
-  model->rate = rate;
-  // Distance along the surface to the patch's edges, exact to first order in the parameters.
-  const double across_u = area / lv * std::min(at.u, 1 - at.u),
-               across_v = area / lu * std::min(at.v, 1 - at.v);
-  model->room = kRoomShare * std::min(across_u, across_v);
+  model->rate = local.rate;
+  model->room = local.room;
   model->arm = triple(axes * (jet.at(Slot::kS) - center));
   model->normal = triple(axes * n);
   model->tangent = triple(axes * t);
-  return std::isfinite(model->w0 + model->w1 + model->w2) && std::isfinite(rate);
+  return std::isfinite(model->w0 + model->w1 + model->w2);
 }
 
 SupportModel plane_model(const Vec3& normal) {

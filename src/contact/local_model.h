@@ -7,14 +7,22 @@
 // For along the great circle from n to d, h'' + h = rho, the inverse Weingarten map along the circle, hence
 // h(t) = d.a + integral of sin(t - s) rho(s) ds; rho = rho(0) gives the middle term (rho(0) (1 - cos t), a
 // sphere exactly; the plain quadratic form would leave rho t^4 / 8 whatever L), and |rho(s) - rho(0)| <= L s
-// the remainder. L is a bound of |dW/dn| (Shape::curvature_rate), as long as the support point stays on the
-// same Bezier patch: |W| |d - n| must be less than the distance to the patch's edges. a, n and W are kept in
-// the body's own axes and turn with it, exactly. Minimising p(d) = h_A(d) + h_B(-d) - d . offset of the two
-// quadratics over unit d is one 2 x 2 system; p at its solution d is wrong by what h is, and above its
-// minimum by what is left of the gradient:
-//     |error of the gap| <= (L_A t_A^3 + L_B t_B^3) / 6 + |grad p|^2 / (2 least eigenvalue of Hess p).
-// The normal, and with it the force, errs to first order in that gradient: by |grad p| / (least eigenvalue),
-// in which the maps' remainder (L_A t_A^2 + L_B t_B^2) / 2 is a bound, and a loose one (kRemainderShare).
+// the remainder. Hypotheses, all checked: L bounds |dW/dn| wherever the support point goes (LocalRate: proven
+// around a), which holds as long as its way, at most |W (d - n)| + L t^2 / 2, is shorter than `room`; t is
+// below kLargestTurn, where t^3 is at most kTurnOverChord times the cube of the chord |d - n| that stands for
+// it here. a, n and W are kept in the body's own axes and turn with it, exactly.
+//
+// Minimising p(d) = h_A(d) + h_B(-d) - d . offset of the two quadratics over unit d is one 2 x 2 system; p at
+// its solution d is wrong by what h is, and above its minimum by what is left of the gradient, g:
+//     |error of the gap| <= (L_A t_A^3 + L_B t_B^3) / 6 + |g|^2 / (2 m)
+// where m is a least eigenvalue of Hess p = W_A + W_B - p I from d to the minimum d*. Hypothesis: p stays
+// convex on the way. With m0 the least eigenvalue of the models' Hessian, (W_A + W_B) changes by at most L_A
+// t_A
+// + L_B t_B from the models' to d and by (L_A + L_B) |d* - d| beyond; while that is at most m0 / 2, m >= m0 /
+// 2 and |d* - d| <= 2 |g| / m0, so  L_A t_A + L_B t_B + 2 (L_A + L_B) |g| / m0 <= m0 / 2  is what is checked
+// (p itself changes by less, by |g| |d* - d|, which kRemainderSafety has room for). The normal, and with it
+// the force, errs to first order in that gradient: by |g| / m, in which the maps' remainder (L_A t_A^2 + L_B
+// t_B^2) / 2 is a bound, and a loose one (kRemainderShare).
 #pragma once
 
 #include "contact/pair_frame.h"
@@ -32,7 +40,7 @@ struct SupportModelOf {
   Triple<Real> tangent;  // unit t, square to n; with s = n x t ...
   Real w0, w1, w2;       // ... W = w0 t t' + w1 (t s' + s t') + w2 s s'
   Real rate;             // L
-  Real room;             // distance to the patch's edges, less a margin
+  Real room;             // distance that the point may move while L holds
 };
 using SupportModel = SupportModelOf<double>;
 
@@ -55,11 +63,11 @@ struct LocalContactOf {
 };
 using LocalContact = LocalContactOf<double>;
 
-// Fills a body's half from the jet at its contact point `at`, given in axes that `axes` turns into the body's
-// own, lengths of the lab; `center` is the body's centre of mass there, `rate` its L. False where W is not
-// finite and positive: the model then can't serve.
-bool make_support_model(const Mat3& axes, const Vec3& center, const SurfacePoint& at, const JetLanes& jet,
-                        double rate, SupportModel* model);
+// Fills a body's half from the jet at its contact point, given in axes that `axes` turns into the body's
+// own, lengths of the lab; `center` is the body's centre of mass there, `local` its rate and room, too. False
+// where W is not finite and positive or there is no rate: the model then can't serve.
+bool make_support_model(const Mat3& axes, const Vec3& center, const JetLanes& jet, const LocalRate& local,
+                        SupportModel* model);
 
 // The half of a plane that does not turn, or of a point of it: `normal` in its own axes.
 SupportModel plane_model(const Vec3& normal);
@@ -122,17 +130,24 @@ NURBS_INLINE LocalContactOf<Real> evaluate_local(const SupportModelOf<Real>& ma,
   c.point_a =
       select<Real>(free == 0.0, c.point_b - c.gap * d, c.point_a);  // of a plane, what B's point meets
   const Real angle2_a = dot(turn_of_a, turn_of_a), angle2_b = dot(turn_of_b, turn_of_b);
+  const Real first_a = ma.rate * root(angle2_a), first_b = mb.rate * root(angle2_b);
   const Real second_a = ma.rate * angle2_a, second_b = mb.rate * angle2_b;
-  const Real third = second_a * root(angle2_a) + second_b * root(angle2_b);
+  const Real third = first_a * angle2_a + first_b * angle2_b;
   // How far p's gradient may be from zero here: what one linear step left of it, and the maps' own remainder.
   // (x + y)^2 <= 2 x^2 + 2 y^2; det / trace is at most the least eigenvalue of p's Hessian.
   const V across = between - c.gap * d;
   const Real left2 = free * dot(across, across), own = free * 0.5 * (second_a + second_b);
   const Real soft = (m11 + m22) * r;
-  c.error = kRemainderSafety * (third * (1.0 / 6) + (left2 + own * own) * soft);
+  // |g|^2 <= 2 (left2 + own^2), so |g|^2 / (2 m) <= 2 (left2 + own^2) soft.
+  c.error = kRemainderSafety * (third * (1.0 / 6) + 2.0 * (left2 + own * own) * soft);
   c.drift = 0.5 * larger(second_a, second_b);
   c.tilt2 = (left2 + kRemainderShare * kRemainderShare * own * own) * soft * soft;
-  c.valid = minimum & (stray2_a <= ma.room * ma.room) & (stray2_b <= mb.room * mb.room);
+  const Real to_minimum = 2.0 * soft * (root(left2) + own);
+  const Mask<Real> convex =
+      ((first_a + first_b + (ma.rate + mb.rate) * to_minimum) * soft <= 0.5) | (free == 0.0);
+  const Real way_a = ma.room - 0.5 * second_a, way_b = mb.room - 0.5 * second_b;
+  c.valid = minimum & convex & (way_a > 0.0) & (way_b > 0.0) & (stray2_a <= way_a * way_a) &
+            (stray2_b <= way_b * way_b) & (larger(angle2_a, angle2_b) <= kLargestTurn * kLargestTurn);
   return c;
 }
 

@@ -83,6 +83,12 @@ NURBS_INLINE Mask<Real> serves(const LocalContactOf<Real>& c, const Real& unique
          (c.tilt2 <= tolerance * tolerance) & (c.drift <= kLocalDrift * allowed);
 }
 
+// The rate at a point of a body, lengths of the lab.
+inline LocalRate local_rate(const Shape& shape, double scale, const SurfacePoint& at) {
+  const LocalRate r = rate_near(shape.rates[at.patch], at);
+  return {scale * r.rate, scale * r.room};
+}
+
 // Whether a model made now is worth its 50 ns: bodies that turn as they did since the last solve, at the
 // worst once more than the last model served, would be served at least once. `gap`: of the contact, a length.
 inline bool may_serve(double rate_a, double rate_b, double turned2_a, double turned2_b, double gap,

@@ -209,13 +209,12 @@ class Ladder {
 
   void remember_model(const PairFrame& pair, const JointSolution& s, double turned2_a, double turned2_b) {
     if (!(s.turn > 0)) return;
-    const double rate_a = pair.scale_a * pair.a->curvature_rate[s.base_a.patch];
-    const double rate_b = pair.scale_b * pair.b->curvature_rate[s.base_b.patch];
-    if (!may_serve(rate_a, rate_b, turned2_a, turned2_b, s.gap, settings_.tolerance, pair.size)) return;
-    if (!make_support_model(Mat3::Identity(), Vec3::Zero(), s.base_a, s.jet_a, rate_a, &memory_.model.a))
+    const LocalRate local_a = local_rate(*pair.a, pair.scale_a, s.base_a),
+                    local_b = local_rate(*pair.b, pair.scale_b, s.base_b);
+    if (!may_serve(local_a.rate, local_b.rate, turned2_a, turned2_b, s.gap, settings_.tolerance, pair.size))
       return;
-    if (!make_support_model(pair.turn.transpose(), pair.offset, s.base_b, s.jet_b, rate_b, &memory_.model.b))
-      return;
+    if (!make_support_model(Mat3::Identity(), Vec3::Zero(), s.jet_a, local_a, &memory_.model.a)) return;
+    if (!make_support_model(pair.turn.transpose(), pair.offset, s.jet_b, local_b, &memory_.model.b)) return;
     limit_turn(*pair.a, pair.scale_a, s.turn, &memory_.model.a);
     limit_turn(*pair.b, pair.scale_b, s.turn, &memory_.model.b);
     memory_.model.unique = 0.5 * s.bracket.unique;

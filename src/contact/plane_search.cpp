@@ -174,13 +174,13 @@ class PlaneLadder {
 
   // A plane asks one support only: the model needs no uniqueness, but no dents near either.
   void remember_model(const WarmSupport& s, double turned2_before, double gap) {
-    const double rate = particle_.scale * shape_.curvature_rate[s.base.patch];
-    if (!may_serve(0, rate, 0, turned2_before, gap, settings_.tolerance, radius_)) return;
+    const LocalRate local = local_rate(shape_, particle_.scale, s.base);
+    if (!may_serve(0, local.rate, 0, turned2_before, gap, settings_.tolerance, radius_)) return;
     if (shape_.dented() && !(shape_.normal_map.radius_at(d_) < kFarAway)) return;
     JetLanes jet = s.jet;
     scale(particle_.scale, &jet);
     SupportModel& model = memory_.model.b;
-    if (!make_support_model(Mat3::Identity(), Vec3::Zero(), s.base, jet, rate, &model)) return;
+    if (!make_support_model(Mat3::Identity(), Vec3::Zero(), jet, local, &model)) return;
     limit_turn(shape_, particle_.scale, kNormalMargin, &model);
     memory_.model.a = plane_model(normal_);
     memory_.model.unique = kFarAway;

@@ -11,10 +11,11 @@ namespace nurbs {
 constexpr double kRoundoff = 8e-16;
 
 // --- a closed body
-constexpr double kJoinTolerance = 1e-6;       // of the box's diagonal: gap between edges that count as joined
-constexpr int kEdgeSamples = 5;               // points at which two edge curves are first compared
-constexpr int kProjectionSamples = 32;        // starts of the search for the closest point of a curve ...
-constexpr int kProjectionSections = 45;       // ... then golden sections: 1/16 of the parameter to 3e-11
+constexpr double kJoinTolerance = 1e-6;   // of the box's diagonal: gap between edges that count as joined
+constexpr double kSameParameters = 1e-3;  // of it: two sides nearer at equal parameters have the same ones
+constexpr int kEdgeSamples = 5;           // points at which two edge curves are first compared
+constexpr int kProjectionSamples = 32;    // starts of the search for the closest point of a curve ...
+constexpr int kProjectionSections = 45;   // ... then golden sections: 1/16 of the parameter to 3e-11
 constexpr double kParameterRoundoff = 1e-12;  // a parameter that moves less has been found
 constexpr int kKinkSamples = 17;              // points at which the normals of two sides are compared
 constexpr double kPoleInset = 1e-4;           // parameters from a pole at which its normals are compared
@@ -27,8 +28,14 @@ constexpr double kSmoothKink = 1e-6;  // such bodies count as smooth: ignoring a
                                       // kink^2/8, 1e-13 of the radius
 constexpr double kSphere =
     1e-12;  // inner and bounding radius this close, relatively: a sphere, and treated as one
-constexpr int kSpeedSamples = 8;      // per parameter, of a patch's parametric speed
-constexpr double kSpeedSafety = 0.9;  // on the least speed seen at the samples
+constexpr double kGapsCrossed = 4;        // joints whose gaps add up: four patches meet in a corner
+constexpr double kJointTightness = 1.1;   // of a bound of a gap or a kink over one that occurs
+constexpr double kJointRoundoff = 4e-15;  // of the body's size: gaps below are none
+constexpr double kNegligibleKink = 1e-9;  // rad: bounds need not be tighter
+constexpr int kJointHalvings = 8;         // of a joint, on the way there
+constexpr int kProjectedPieces = 256;     // of a joint whose sides are paired point by point
+constexpr double kVanishing = 1e-12;      // relative: coefficients below are zero
+constexpr double kSmallKink = 0.1;        // rad: larger ones are edges, not imperfect joints
 
 // --- mass
 constexpr double kMomentTolerance = 1e-12;  // of each moment, per integration cell
@@ -51,14 +58,25 @@ constexpr double kSingularCross = 5e-5;  // |Su x Sv| over the middle's |Su| |Sv
                                          // Curvature loses the square of it in digits: about eight remain
 constexpr double kInsets[] = {1e-4, 1e-3};  // parameters towards the middle, in turn, where it is looked at
                                             // instead
-constexpr int kPatternRounds = 14;    // halvings of the grid step in the search for the largest curvature
-constexpr double kChangeShare = 0.1;  // by which that is widened: of its change over a grid step ...
-constexpr double kCurvatureMargin = 1e-6;  // ... and of itself
-constexpr double kCurvatureNoise = 1e-9;   // over the bounding radius: curvatures up to this are round-off
-constexpr double kRateInset = 1e-3;        // parameters from the edges, of the samples of its rate of change:
-                                           // at a pole the form is singular
-constexpr int kRateSamples = 12;           // per patch parameter
-constexpr double kRateSafety = 2;          // on the largest rate seen between samples
+constexpr double kCurvatureNoise = 1e-9;    // over the bounding radius: curvatures up to this are round-off
+constexpr double kRadiusTightness = 1.15;   // of proven curvature radii over ones that occur ...
+constexpr double kRateTightness = 1.3;      // ... and of the rates of their change ...
+constexpr double kRateFloor = 0.25;        // ... unless those are below this share of the patch's largest one
+constexpr double kSmallRate = 0.02;        // ... or of the largest radius
+constexpr double kUselessRate = 1e6;       // of the body's size: no local model would serve
+constexpr int kRateCells = 8;              // per patch parameter, for which rates are kept
+constexpr double kGridRoundoff = 1e-9;     // of such a cell: leaves' rims are known to this
+constexpr double kEvenWeights = 1e-9;      // ratios of weights this near 1 are left as they are
+constexpr double kPoleStrip = 0.0625;      // of a patch's parameter, at a pole, where no rate is proven
+constexpr int kMostCells = 16000;          // enclosed for a body's radii ...
+constexpr int kMostRateCells = 5000;       // ... and for its rates ...
+constexpr int kMostCellsPerPatch = 150;    // ... and so many more for each of its patches
+constexpr int kDeepestCell = 40;           // halvings of a patch
+constexpr int kDeepestUnproven = 24;       // ... of a cell that is not proven convex
+constexpr double kWideCone = 0.5;          // rad, of a cell's normals: both ways to halve it are tried
+constexpr double kLeastNormalCell = 1e-5;  // of a patch's parameters: halved no more for the normal map
+constexpr double kNetRoundoff = 2e-15;     // of a coefficient of a cell's net, over the largest
+constexpr int kCubicAngles = 16;           // at which the third-order form is looked at in half a turn
 
 // --- dents
 constexpr double kAllowedDent = 1e-3;      // deeper is no convex body; up to this, a dent is left to the hull
@@ -81,15 +99,12 @@ constexpr int kAtlasSamples = 4;  // per patch and direction, to start the first
 constexpr int kNormalCells = 64;           // per cube edge: cells 0.01 to 0.03 rad wide
 constexpr double kNormalMargin = 0.01;     // rad around a normal for which the map's promise holds
 constexpr double kLongRadius = 4;          // bounding radii
-constexpr int kNormalQuads = 4;            // per patch parameter, to begin with ...
-constexpr int kNormalDepth = 5;            // ... halved so often where normals spread ...
-constexpr double kNormalQuadAngle = 0.02;  // ... by more than this, rad, or curvature radii ...
+constexpr double kNormalLeafAngle = 0.02;  // rad: leaves are halved until their normals are as close together
+constexpr int kMostNormalCells = 20000;    // ... and these many are enclosed, or their radii differ ...
 constexpr double kEvenRadius = 1.5;        // ... by more than this factor
 constexpr int kNormalJointSamples = 64;    // along a kinked joint
 constexpr double kNormalCap = 0.2;         // widest cap of directions painted, rad
-constexpr double kRadiusSafety = 1.1;      // on the largest radius seen in a quad
-constexpr double kCapSafety = 1.2;         // on the angle between its normals; 1.5 across a joint, whose
-constexpr double kJointCapSafety = 1.5;    // sides meet at an angle that varies along it
+constexpr double kJointCapSafety = 1.5;    // on the angle between the sides of a joint, which varies along it
 
 // --- support mapping
 constexpr int kSupportIterations = 60;  // 3 to 5 are usual; hops between patches count too
@@ -131,13 +146,14 @@ constexpr int kWarmIterations = 4;     // 1 or 2 are usual
 constexpr int kPolishIterations = 12;  // from a cold start
 
 // --- local model
-constexpr double kRemainderSafety = 1.5;  // on the third-order remainder, for the fourth-order terms left out
-constexpr double kRemainderShare = 0.1;   // of the bound on the maps' remainder that normals err by: rates
-                                          // are the largest of a patch, doubled, and no turn meets them all
-constexpr double kForceDepth = 1e-3;      // of the smaller radius: overlaps are right to the tolerance times
-                                          // themselves, or times this if they are shallower
-constexpr double kLocalDrift = 20;        // of the tolerance that the contact points may be off
-constexpr double kRoomShare = 0.5;  // of the distance to the patch's edges that the contact point may move
+constexpr double kLargestTurn = 0.5;       // rad; the chord that stands for the turn is then shorter by ...
+constexpr double kTurnOverChord = 1.033;   // ... no more than this, cubed
+constexpr double kRemainderSafety = 1.05;  // on the third-order remainder: that, and round-off
+constexpr double kRemainderShare = 0.1;    // of the bound on the maps' remainder that normals err by: rates
+                                           // are the largest of a patch, doubled, and no turn meets them all
+constexpr double kForceDepth = 1e-3;       // of the smaller radius: overlaps are right to the tolerance times
+                                           // themselves, or times this if they are shallower
+constexpr double kLocalDrift = 20;         // of the tolerance that the contact points may be off
 
 // --- polytope method
 constexpr int kHullVertices = 512;   // support pairs a fallback may spend; 20 to 80 are usual

@@ -1,0 +1,311 @@
+// Halving of cells, level by level; see surface_bounds.h.
+#include "body/surface_bounds.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "nurbs/tolerances.h"
+
+namespace nurbs {
+namespace {
+
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+
+struct Open {
+  Leaf leaf;
+  int depth = 0;
+};
+
+bool smooth_pole(const EdgeLink& link, double size) {
+  return link.collapsed && link.kink_bound <= kNoKink && link.gap <= kJointRoundoff * size;
+}
+
+bool touches(const Cell& c, int edge) {
+  switch (edge) {
+    case 0:
+      return c.u0 == 0;
+    case 1:
+      return c.u0 + c.du == 1;
+    case 2:
+      return c.v0 == 0;
+    default:
+      return c.v0 + c.dv == 1;
+  }
+}
+
+// Halves at once; the pole's strip first, so that cells lie in one or outside.
+std::vector<Cell> first_cells(const Shape& shape, const std::vector<BezierPatch>& even, int patch) {
+  std::vector<Cell> cells = {whole_patch(even, patch)};
+  for (int edge = 0; edge < 4; ++edge) {
+    const EdgeLink& link = shape.links[patch][edge];
+    if (!link.collapsed) continue;
+    std::vector<Cell> next;
+    for (Cell& c : cells) {
+      if (!touches(c, edge)) {
+        next.push_back(std::move(c));
+        continue;
+      }
+      if (smooth_pole(link, shape.bounding_radius)) c.pole = edge;
+      while ((edge < 2 ? c.du : c.dv) > kPoleStrip) {
+        auto [low, high] = halve(even[patch], c, edge < 2);
+        next.push_back(edge % 2 ? std::move(low) : std::move(high));
+        c = edge % 2 ? std::move(high) : std::move(low);
+      }
+      next.push_back(std::move(c));
+    }
+    cells.swap(next);
+  }
+  return cells;
+}
+
+bool in_pole_strip(const Shape& shape, const Cell& c) {
+  const auto& links = shape.links[c.patch];
+  return (links[0].collapsed && c.u0 < kPoleStrip) || (links[1].collapsed && c.u0 + c.du > 1 - kPoleStrip) ||
+         (links[2].collapsed && c.v0 < kPoleStrip) || (links[3].collapsed && c.v0 + c.dv > 1 - kPoleStrip);
+}
+
+// Halves of a leaf the better way: where little is proven yet both ways are tried, since a needle's cells are
+// a thousand times longer than wide.
+std::pair<Leaf, Leaf> split(const BezierPatch& patch, const Leaf& leaf, bool with_rate, int* cells) {
+  const auto bound = [&](Leaf* l) {
+    ++*cells;
+    l->bounds = enclose(patch, l->cell, with_rate);
+  };
+  const auto halves = [&](bool in_u) {
+    auto [a, b] = halve(patch, leaf.cell, in_u);
+    std::pair<Leaf, Leaf> pair{{std::move(a), {}, {}}, {std::move(b), {}, {}}};
+    bound(&pair.first);
+    bound(&pair.second);
+    return pair;
+  };
+  std::pair<Leaf, Leaf> best = halves(leaf.bounds.split_u);
+  if (leaf.bounds.convex && leaf.bounds.cone < kWideCone) return best;
+  std::pair<Leaf, Leaf> other = halves(!leaf.bounds.split_u);
+  const auto doubt = [](const std::pair<Leaf, Leaf>& p) {
+    return p.first.bounds.doubt + p.second.bounds.doubt;
+  };
+  return doubt(other) < doubt(best) ? other : best;
+}
+
+// u = r s / (1 + (r - 1) s), s the parameter of the even patch.
+struct Change {
+  double ratio = 1;
+  double at(double s) const { return ratio == 1 ? s : ratio * s / (1 + (ratio - 1) * s); }
+  double slope(double s) const { return ratio / ((1 + (ratio - 1) * s) * (1 + (ratio - 1) * s)); }
+  double largest_slope(double from, double to) const { return std::max(slope(from), slope(to)); }
+};
+
+// Makes the weights of opposite corners equal on the average, by powers of a ratio; returns the ratios of u,
+// v.
+std::pair<Change, Change> even_out(BezierPatch* patch) {
+  const int m = patch->degree_u, n = patch->degree_v;
+  const double a = patch->point(0, 0)[3], b = patch->point(0, n)[3], c = patch->point(m, 0)[3],
+               d = patch->point(m, n)[3];
+  const auto ratio = [](double first, double last, int degree) {
+    const double r = std::pow(first / last, 0.5 / degree);
+    return Change{std::abs(r - 1) < kEvenWeights ? 1 : r};
+  };
+  const Change u = ratio(a * b, c * d, m), v = ratio(a * c, b * d, n);
+  for (int i = 0; i <= m; ++i)
+    for (int j = 0; j <= n; ++j) patch->point(i, j) *= std::pow(u.ratio, i) * std::pow(v.ratio, j);
+  return {u, v};
+}
+
+class Bounder {
+ public:
+  explicit Bounder(const Shape& shape)
+      : shape_(shape),
+        patches_(static_cast<int>(shape.patches.size())),
+        seen_rate_(shape.patches.size(), 0) {}
+
+  SurfaceBounds run(bool sphere) {
+    sphere_ = sphere;
+    out_.seen_min = kInfinity;
+    out_.even = shape_.patches;
+    for (BezierPatch& patch : out_.even) changes_.push_back(even_out(&patch));
+    for (int p = 0; p < patches_; ++p)
+      for (Cell& c : first_cells(shape_, out_.even, p)) {
+        Leaf leaf{std::move(c), {}, {}};
+        leaf.bounds = enclose(out_.even[p], leaf.cell, wants_rate(leaf.cell));
+        ++out_.cells;
+        add(std::move(leaf), 0);
+      }
+    halve_while([this](const Open& o) { return radii_loose(o); }, kMostCells + kMostCellsPerPatch * patches_);
+    begin_rates();
+    halve_while([this](const Open& o) { return rate_loose(o); },
+                out_.cells + kMostRateCells + kMostCellsPerPatch * patches_);
+    for (Open& o : open_) out_.leaves.push_back(std::move(o.leaf));
+    finish();
+    return std::move(out_);
+  }
+
+ private:
+  bool wants_rate(const Cell& c) const { return with_rates_ && !in_pole_strip(shape_, c); }
+
+  // Radii come first, without rates, which cost as much again.
+  void begin_rates() {
+    with_rates_ = true;
+    for (Open& o : open_) {
+      if (!o.leaf.bounds.convex || !wants_rate(o.leaf.cell)) continue;
+      o.leaf.bounds = enclose(out_.even[o.leaf.cell.patch], o.leaf.cell, true);
+      see_rate(o.leaf);
+    }
+  }
+  void see_rate(const Leaf& leaf) {
+    const double seen = leaf.bounds.seen_rate;
+    double& most = seen_rate_[leaf.cell.patch];
+    if (seen < kUselessRate * shape_.bounding_radius) most = std::max(most, seen);
+  }
+
+  void add(Leaf leaf, int depth) {
+    const CellBounds& b = leaf.bounds;
+    if (b.seen_curvature > 0) {
+      out_.seen_min = std::min(out_.seen_min, b.seen_min);
+      out_.seen_max = std::max(out_.seen_max, b.seen_max);
+    }
+    see_rate(leaf);
+    open_.push_back({std::move(leaf), depth});
+  }
+
+  template <class Loose>
+  void halve_while(const Loose& loose, int most_cells) {
+    for (bool changed = true; changed && out_.cells < most_cells;) {
+      std::vector<Open> level;
+      level.swap(open_);
+      changed = false;
+      for (Open& o : level) {
+        if (out_.cells >= most_cells || o.depth >= kDeepestCell || !loose(o)) {
+          open_.push_back(std::move(o));
+          continue;
+        }
+        changed = true;
+        auto [a, b] = split(out_.even[o.leaf.cell.patch], o.leaf, wants_rate(o.leaf.cell), &out_.cells);
+        add(std::move(a), o.depth + 1);
+        add(std::move(b), o.depth + 1);
+      }
+    }
+  }
+
+  bool radii_loose(const Open& o) const {
+    const CellBounds& b = o.leaf.bounds;
+    if (!b.convex)
+      return o.depth < kDeepestUnproven && b.seen_curvature > 0 && !is_flat(b, shape_.bounding_radius);
+    if (sphere_) return false;
+    return b.min_radius < out_.seen_min / kRadiusTightness || b.max_radius > kRadiusTightness * out_.seen_max;
+  }
+
+  bool rate_loose(const Open& o) const {
+    const CellBounds& b = o.leaf.bounds;
+    if (sphere_ || !b.convex || b.seen_rate == 0 || b.seen_rate > kUselessRate * shape_.bounding_radius)
+      return false;
+    const double floor = std::max(kRateFloor * seen_rate_[o.leaf.cell.patch], kSmallRate * out_.seen_max);
+    return b.rate > kRateTightness * std::max(b.seen_rate, floor);
+  }
+
+  void finish() {
+    CurvatureBounds& radii = out_.radii;
+    radii.min_radius = kInfinity;
+    for (Leaf& leaf : out_.leaves) {
+      const Cell& c = leaf.cell;
+      const auto& [u, v] = changes_[c.patch];
+      leaf.middle = {c.patch, u.at(c.u0 + 0.5 * c.du), v.at(c.v0 + 0.5 * c.dv)};
+      radii.min_radius = std::min(radii.min_radius, leaf.bounds.min_radius);
+      radii.max_radius = std::max(radii.max_radius, leaf.bounds.max_radius);
+    }
+    for (const double rate : seen_rate_) out_.seen_rate = std::max(out_.seen_rate, rate);
+    fill_rates();
+  }
+
+  // The grids, each cell from the leaves that reach into it or the cells around it.
+  void fill_rates() {
+    constexpr int n = kRateCells;
+    PatchRate::Cell none;
+    none.rate = 0;
+    none.speed_u = none.speed_v = std::numeric_limits<float>::infinity();
+    out_.rates.resize(patches_);
+    for (PatchRate& r : out_.rates) r.cells.assign(n * n, none);
+    const auto up = [](double x) {
+      return std::nextafter(static_cast<float>(x), std::numeric_limits<float>::infinity());
+    };
+    const auto down = [](double x) { return std::nextafter(static_cast<float>(x), 0.0f); };
+    // Cells that a leaf or its rim touches, and those around them.
+    const auto first_of = [](double x) { return static_cast<int>(std::floor(x * n - kGridRoundoff)) - 1; };
+    const auto last_of = [](double x) { return static_cast<int>(std::floor(x * n + kGridRoundoff)) + 1; };
+    for (const Leaf& leaf : out_.leaves) {
+      const Cell& c = leaf.cell;
+      const CellBounds& b = leaf.bounds;
+      const auto& [u, v] = changes_[c.patch];
+      const double fastest_u = u.largest_slope(c.u0, c.u0 + c.du),
+                   fastest_v = v.largest_slope(c.v0, c.v0 + c.dv);
+      const int i0 = first_of(u.at(c.u0)), i1 = last_of(u.at(c.u0 + c.du)), j0 = first_of(v.at(c.v0)),
+                j1 = last_of(v.at(c.v0 + c.dv));
+      for (int i = std::max(i0, 0); i <= std::min(i1, n - 1); ++i)
+        for (int j = std::max(j0, 0); j <= std::min(j1, n - 1); ++j) {
+          PatchRate::Cell& cell = out_.rates[c.patch].cells[i * n + j];
+          cell.rate = std::max(cell.rate, up(b.rate));
+          cell.speed_u = std::min(cell.speed_u, down(b.speed_u / fastest_u));
+          cell.speed_v = std::min(cell.speed_v, down(b.speed_v / fastest_v));
+        }
+    }
+  }
+
+  const Shape& shape_;
+  const int patches_;
+  bool with_rates_ = false, sphere_ = false;
+  std::vector<std::pair<Change, Change>> changes_;
+  std::vector<Open> open_;
+  std::vector<double> seen_rate_;
+  SurfaceBounds out_;
+};
+
+}  // namespace
+
+LocalRate rate_near(const PatchRate& patch, const SurfacePoint& at) {
+  constexpr int n = kRateCells;
+  const int i = std::clamp(static_cast<int>(at.u * n), 0, n - 1),
+            j = std::clamp(static_cast<int>(at.v * n), 0, n - 1);
+  const PatchRate::Cell& cell = patch.cells[i * n + j];
+  // To the rim of the three by three cells around, within the patch.
+  const double across_u = std::min(at.u - std::max(i - 1.0, 0.0) / n, std::min(i + 2.0, 1.0 * n) / n - at.u),
+               across_v = std::min(at.v - std::max(j - 1.0, 0.0) / n, std::min(j + 2.0, 1.0 * n) / n - at.v);
+  const double room = std::min(cell.speed_u * across_u, cell.speed_v * across_v);
+  return {cell.rate, std::max(room, 0.0)};
+}
+
+bool is_flat(const CellBounds& b, double size) {
+  const double noise = kCurvatureNoise / size;
+  return b.regular && !b.convex && b.least_curvature >= -noise && b.seen_curvature <= noise;
+}
+
+SurfaceBounds bound_surface(const Shape& shape, bool sphere) {
+  return Bounder(shape).run(sphere);
+}
+
+void refine_normals(double cone, double spread, int cells, SurfaceBounds* bounds) {
+  int spent = 0;
+  // What has no normals yet first: it would leave nothing of the map.
+  for (const bool wide : {true, false}) {
+    const auto loose = [&](const CellBounds& b) {
+      if (!b.regular || b.cone > (wide ? kNormalCap : cone)) return true;
+      return !wide && b.convex && b.max_radius > spread * b.seen_max;
+    };
+    std::vector<Leaf> done, open = std::move(bounds->leaves);
+    while (!open.empty()) {
+      std::vector<Leaf> level;
+      level.swap(open);
+      for (Leaf& leaf : level) {
+        if (spent >= cells || !loose(leaf.bounds) || leaf.cell.du * leaf.cell.dv < kLeastNormalCell) {
+          done.push_back(std::move(leaf));
+          continue;
+        }
+        auto [a, b] = split(bounds->even[leaf.cell.patch], leaf, false, &spent);
+        open.push_back(std::move(a));
+        open.push_back(std::move(b));
+      }
+    }
+    bounds->leaves = std::move(done);
+  }
+}
+
+}  // namespace nurbs

@@ -1,0 +1,45 @@
+// Bounds over whole patches, from enclosures of cells that are halved until the bounds are tight: curvature
+// radii, the rate at which curvature changes, convexity.
+#pragma once
+
+#include <vector>
+
+#include "body/enclosure.h"
+#include "body/shape.h"
+
+namespace nurbs {
+
+// A cell as it was left, of the patch `SurfaceBounds::even` has.
+struct Leaf {
+  Cell cell;
+  CellBounds bounds;
+  SurfacePoint middle;  // in the shape's own parameters
+};
+
+struct SurfaceBounds {
+  CurvatureBounds radii;         // inside the patches, proven
+  std::vector<PatchRate> rates;  // per patch, proven
+  std::vector<Leaf> leaves;      // cover every patch
+  // The patches with weights as even as a change of parameters makes them (u = r s / (1 + (r - 1) s)), which
+  // is what cells are cut from: uneven weights make uneven parameters, and more cells.
+  std::vector<BezierPatch> even;
+  double seen_min = 0, seen_max = 0, seen_rate = 0;  // that occur: what the bounds can at best be
+  int cells = 0;                                     // enclosed
+};
+
+// Of a shape whose patches and links with their kinks are done, and its radii. Leaves are halved, all patches
+// alike, until every one is proven convex, flat, or seen not to be; the radii are within kRadiusTightness of
+// ones that occur, and each leaf's rate within kRateTightness of one that occurs in it or small beside its
+// patch's; or until kMostCells are spent: bounds are then looser, and hold. Of a `sphere`, whose radii are
+// known, only convexity. Tens of ms.
+SurfaceBounds bound_surface(const Shape& shape, bool sphere = false);
+
+// Whether a leaf has no negative curvature beyond round-off, though not all are positive: flat or ruled.
+bool is_flat(const CellBounds& bounds, double size);
+
+// Halves the leaves further until the normals of each are within `cone` (rad) of its axis and its
+// largest radius within the factor `spread` of one that occurs there, `cells` allowing: what the normal map
+// is painted with.
+void refine_normals(double cone, double spread, int cells, SurfaceBounds* bounds);
+
+}  // namespace nurbs

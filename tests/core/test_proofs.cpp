@@ -1,0 +1,378 @@
+// What is proven of a body at load: every bound against dense evaluation, on bodies built to hide from
+// samples.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "body/connectivity.h"
+#include "body/enclosure.h"
+#include "body/joints.h"
+#include "body/local_form.h"
+#include "body/shape.h"
+#include "body/support.h"
+#include "contact/pair_search.h"
+#include "io/pair_case.h"
+#include "nurbs/tolerances.h"
+#include "shapes/primitives.h"
+#include "support/bodies.h"
+#include "support/cases.h"
+#include "support/random.h"
+
+namespace nurbs {
+namespace {
+
+using namespace test;
+using Surfaces = std::vector<NurbsSurface>;
+
+// The same surface at u = r s / (1 + (r - 1) s), likewise v: one Bezier piece's weights times powers.
+void reparametrise(NurbsSurface& s, double along_u, double along_v) {
+  for (int i = 0; i < s.size_u; ++i)
+    for (int j = 0; j < s.size_v; ++j) s.point(i, j) *= std::pow(along_u, i) * std::pow(along_v, j);
+}
+
+Surfaces mismatched(Random& random, Surfaces body, double most) {
+  for (NurbsSurface& s : body) {
+    const double u = random.log_uniform(1 / most, most), v = random.log_uniform(1 / most, most);
+    reparametrise(s, u, v);
+  }
+  return body;
+}
+
+// A body of revolution as one patch, meridian (r, z) with weights.
+Surfaces revolve(const std::vector<Vec3>& meridian) {
+  constexpr int kCircle[9][2] = {{1, 0},   {1, 1},  {0, 1},  {-1, 1}, {-1, 0},
+                                 {-1, -1}, {0, -1}, {1, -1}, {1, 0}};
+  NurbsSurface s;
+  s.degree_u = 2;
+  s.degree_v = static_cast<int>(meridian.size()) - 1;
+  s.knots_u = {0, 0, 0, 0.25, 0.25, 0.5, 0.5, 0.75, 0.75, 1, 1, 1};
+  s.knots_v.assign(meridian.size(), 0);
+  s.knots_v.resize(2 * meridian.size(), 1);
+  s.size_u = 9;
+  s.size_v = static_cast<int>(meridian.size());
+  for (int i = 0; i < 9; ++i)
+    for (const Vec3& m : meridian)
+      s.points.push_back((i % 2 ? std::sqrt(0.5) : 1) * m[2] *
+                         Vec4(m[0] * kCircle[i][0], m[0] * kCircle[i][1], m[1], 1));
+  return {s};
+}
+
+// Largest |C(t, t, t)| at a point by finite differences of W along geodesics of the Gauss map: independent of
+// the formula in enclosure.cpp.
+Mat3 map_at(const BezierPatch& patch, double u, double v, Vec3* n) {
+  const Jet2 j = evaluate2(patch, u, v);
+  *n = j.su.cross(j.sv).normalized();
+  Mat2 d;
+  d << -n->dot(j.suu), -n->dot(j.suv), -n->dot(j.suv), -n->dot(j.svv);
+  Eigen::Matrix<double, 3, 2> jacobian;
+  jacobian << j.su, j.sv;
+  return jacobian * d.inverse() * jacobian.transpose();
+}
+double rate_seen(const BezierPatch& patch, double u, double v) {
+  double most = 0;
+  for (const Vec2& step : {Vec2(1e-5, 0), Vec2(0, 1e-5), Vec2(1e-5, 1e-5), Vec2(1e-5, -1e-5)}) {
+    Vec3 a, b;
+    const Mat3 wa = map_at(patch, u - step[0], v - step[1], &a),
+               wb = map_at(patch, u + step[0], v + step[1], &b);
+    const Vec3 t = (b - a).normalized();
+    // t' W t at both ends, t carried along the great circle.
+    const Vec3 ta = (t - t.dot(a) * a).normalized(), tb = (t - t.dot(b) * b).normalized();
+    most = std::max(most, std::abs(tb.dot(wb * tb) - ta.dot(wa * ta)) / angle_between(a, b));
+  }
+  return most;
+}
+
+// Every bound of a cell against points inside it.
+void expect_encloses(const Shape& shape, int patch, const Cell& cell, Random& random) {
+  const CellBounds b = enclose(shape.patches[patch], cell, true);
+  if (!b.regular) return;
+  for (int k = 0; k < 12; ++k) {
+    const double u = cell.u0 + cell.du * (k == 0 ? 0.5 : random.uniform(0, 1)),
+                 v = cell.v0 + cell.dv * (k == 0 ? 0.5 : random.uniform(0, 1));
+    const Jet2 j = evaluate2(shape.patches[patch], u, v);
+    const Vec3 n = j.su.cross(j.sv);
+    if (!(n.norm() > 1e-9 * j.su.norm() * j.sv.norm())) continue;
+    ASSERT_LE(angle_between(b.axis, n), b.cone * (1 + 1e-9) + 1e-7) << shape.name;
+    if (cell.pole < 0) {
+      EXPECT_GE(n.norm() / j.sv.norm(), b.speed_u * (1 - 1e-9));
+      EXPECT_GE(n.norm() / j.su.norm(), b.speed_v * (1 - 1e-9));
+    }
+    const LocalForm f = local_form(shape.patches[patch], u, v);
+    if (f.u != u || f.v != v) continue;
+    EXPECT_GE(f.k_min, b.least_curvature - 1e-6 * f.k_max) << shape.name;
+    EXPECT_LE(f.k_max, (1 + 1e-6) / b.min_radius) << shape.name;
+    if (!b.convex) continue;
+    EXPECT_LE(1 / f.k_min, b.max_radius * (1 + 1e-6)) << shape.name;
+    if (b.rate < 1e300 && u > 1e-4 && v > 1e-4 && u < 1 - 1e-4 && v < 1 - 1e-4) {
+      EXPECT_LE(rate_seen(shape.patches[patch], u, v), b.rate * 1.001 + 1e-5 * b.max_radius) << shape.name;
+    }
+  }
+}
+
+TEST(Enclosure, holds_at_every_point_of_every_cell) {
+  Random random(7);
+  std::vector<ShapePointer> shapes = {ellipsoid(), smooth_pebble(), polar(), kinked(), disc()};
+  shapes.push_back(make_shape("needle", exact_ellipsoid({1, 0.05, 0.01})));
+  shapes.push_back(make_shape("blocky", fitted_superellipsoid({1, 0.9, 0.8}, 4, 3)));
+  shapes.push_back(make_shape("mismatched", mismatched(random, exact_ellipsoid({1, 0.7, 0.4}), 8)));
+  for (const ShapePointer& shape : shapes)
+    for (int trial = 0; trial < 60; ++trial) {
+      const int patch = random.below(static_cast<int>(shape->patches.size()));
+      Cell cell = whole_patch(shape->patches, patch);
+      for (int edge = 0; edge < 4; ++edge)
+        if (shape->links[patch][edge].collapsed) cell.pole = edge;
+      for (int depth = random.whole(4, 14); depth > 0; --depth) {
+        auto [a, b] = halve(shape->patches[patch], cell, random.below(2));
+        cell = random.below(2) ? a : b;
+      }
+      expect_encloses(*shape, patch, cell, random);
+    }
+}
+
+TEST(Enclosure, turned_polar_cells_are_the_same) {
+  // The pole at u = 0, u = 1, v = 0 and v = 1 of the same surface.
+  const NurbsSurface original = revolved_ellipsoid(1, 0.6)[0];
+  NurbsSurface swapped = swap_uv(original);
+  std::vector<CellBounds> seen;
+  for (const NurbsSurface& surface : {original, swapped}) {
+    const auto shape = make_shape("turned", {surface});
+    for (const BezierPatch& patch : shape->patches) {
+      const size_t p = &patch - shape->patches.data();
+      for (int edge = 0; edge < 4; ++edge) {
+        if (!shape->links[p][edge].collapsed) continue;
+        Cell cell = whole_patch(shape->patches, static_cast<int>(p));
+        cell.pole = edge;
+        for (int k = 0; k < 4; ++k) {
+          auto [across, beyond] = halve(patch, cell, edge < 2);
+          cell = edge % 2 ? beyond : across;
+          auto [first, second] = halve(patch, cell, edge >= 2);
+          cell = k % 2 ? first : second;
+        }
+        const CellBounds b = enclose(patch, cell, false);
+        EXPECT_TRUE(b.convex);
+        EXPECT_LE(b.seen_max, b.max_radius);
+        EXPECT_GE(b.seen_min, b.min_radius);
+        EXPECT_LT(b.max_radius, 1.5 * b.seen_max);
+      }
+    }
+  }
+}
+
+TEST(Radii, of_ellipsoids_to_1000_to_1_hold_and_are_tight) {
+  Random random(11);
+  const Vec3 given[] = {{1, 0.15, 0.03}, {1, 0.1, 0.01}, {1, 1, 0.001}, {1, 0.001, 0.001}, {1, 0.03, 0.001}};
+  for (Vec3 a : given) {
+    std::shuffle(a.data(), a.data() + 3, random.engine());
+    const auto shape = make_shape("ellipsoid", exact_ellipsoid(a));
+    std::sort(a.data(), a.data() + 3);
+    const double least = a[0] * a[0] / a[2], most = a[2] * a[2] / a[0];
+    EXPECT_LE(shape->patch_curvature.min_radius, least * (1 + 1e-9)) << a.transpose();
+    EXPECT_GE(shape->patch_curvature.max_radius, most * (1 - 1e-9)) << a.transpose();
+    EXPECT_GE(shape->patch_curvature.min_radius, 0.8 * least) << a.transpose();
+    EXPECT_LE(shape->patch_curvature.max_radius, 1.2 * most) << a.transpose();
+    EXPECT_TRUE(shape->proofs.convex) << a.transpose();
+  }
+}
+
+TEST(Radii, see_a_spike_between_all_samples) {
+  // A rounded rim: a conic of large weight, that lies in a hundredth of the patch's parameter. The truth is
+  // the same surface at even parameters, looked at densely.
+  for (const double ratio : {1.0, 30.0, 1000.0}) {
+    const double w = 12;
+    Surfaces body =
+        revolve({{0, -0.5, 1}, {0.6, -0.5, 1}, {1, -0.5, w}, {1, 0.1, w}, {0.4, 0.6, 1}, {0, 0.6, 1}});
+    const auto even = make_shape("even", body);
+    double least = 1e300;
+    for (const BezierPatch& patch : even->patches)
+      for (int k = 1; k < 4000; ++k) least = std::min(least, 1 / local_form(patch, 0.5, k / 4000.0).k_max);
+    for (int i = 0; i < body[0].size_u; ++i)
+      for (int j = 0; j < body[0].size_v; ++j) body[0].point(i, j) *= std::pow(ratio, j);
+    const auto shape = make_shape("spike", body);
+    EXPECT_LE(shape->patch_curvature.min_radius, least * (1 + 1e-6)) << ratio;
+    EXPECT_GE(shape->patch_curvature.min_radius, 0.5 * least) << ratio;
+  }
+}
+
+TEST(Rates, hold_everywhere) {
+  Random random(5);
+  for (const ShapePointer& shape : {ellipsoid(), smooth_pebble(), disc(), kinked(), polar()}) {
+    int finite = 0;
+    for (int k = 0; k < 3000; ++k) {
+      const SurfacePoint at{random.below(static_cast<int>(shape->patches.size())),
+                            random.uniform(0.001, 0.999), random.uniform(0.001, 0.999)};
+      const LocalRate local = rate_near(shape->rates[at.patch], at);
+      if (!(local.rate < kFarAway)) continue;
+      ++finite;
+      EXPECT_LE(rate_seen(shape->patches[at.patch], at.u, at.v), local.rate * 1.001 + 1e-5) << shape->name;
+      // As far as `room` goes, the same rate holds.
+      const BezierPatch& patch = shape->patches[at.patch];
+      const Vec3 x = evaluate0(patch, at.u, at.v);
+      const SurfacePoint other{at.patch, std::clamp(at.u + random.uniform(-0.2, 0.2), 0.001, 0.999),
+                               std::clamp(at.v + random.uniform(-0.2, 0.2), 0.001, 0.999)};
+      if ((evaluate0(patch, other.u, other.v) - x).norm() < 0.9 * local.room) {
+        EXPECT_LE(rate_seen(patch, other.u, other.v), local.rate * 1.001 + 1e-5) << shape->name;
+      }
+    }
+    EXPECT_GT(finite, 2000) << shape->name;
+  }
+}
+
+TEST(Joints, mismatched_parameters_are_the_same_body) {
+  Random random(3);
+  const Vec3 axes(1, 0.8, 0.6);
+  const auto plain = make_shape("plain", exact_ellipsoid(axes));
+  for (int trial = 0; trial < 6; ++trial) {
+    const auto shape =
+        make_shape("mismatched", mismatched(random, exact_ellipsoid(axes), trial < 3 ? 3 : 20));
+    EXPECT_TRUE(shape->smooth);
+    EXPECT_LT(shape->proofs.joint_gap, 1e-14);
+    EXPECT_LT(std::max(shape->proofs.opening, shape->proofs.closing), kNoKink);
+    EXPECT_EQ(shape->support_excess, 0);
+    EXPECT_TRUE(shape->proofs.convex);
+    for (int k = 0; k < 300; ++k) {
+      const Vec3 d = random.direction();
+      const double h = axes.cwiseProduct(d).norm();
+      const SurfacePoint start{random.below(6), random.uniform(0, 1), random.uniform(0, 1)};
+      const Support s = find_support(*shape, d, &start);
+      EXPECT_NEAR(s.h, h, 1e-14) << "trial " << trial;
+      EXPECT_GE(s.upper, h - 1e-15);
+      EXPECT_LT(s.upper - s.h, 1e-9);
+    }
+  }
+}
+
+TEST(Joints, straight_sides_of_any_parametrisation_join) {
+  // A box whose face is biquadratic with uneven, though collinear, control points: no Moebius map relates it
+  // to its bilinear neighbours.
+  Surfaces body = box({1, 0.8, 0.6});
+  NurbsSurface& face = body[0];
+  const Vec4 corner[2][2] = {{face.point(0, 0), face.point(0, 1)}, {face.point(1, 0), face.point(1, 1)}};
+  NurbsSurface finer;
+  finer.degree_u = finer.degree_v = 2;
+  finer.size_u = finer.size_v = 3;
+  finer.knots_u = finer.knots_v = {0, 0, 0, 1, 1, 1};
+  const double at[3] = {0, 0.3, 1};
+  for (const double u : at)
+    for (const double v : at)
+      finer.points.push_back((1 - u) * ((1 - v) * corner[0][0] + v * corner[0][1]) +
+                             u * ((1 - v) * corner[1][0] + v * corner[1][1]));
+  face = finer;
+  const auto shape = make_shape("box", body);
+  EXPECT_LT(shape->proofs.joint_gap, 1e-12);
+  Random random(2);
+  for (int k = 0; k < 100; ++k) {
+    const Vec3 d = random.direction();
+    EXPECT_NEAR(find_support(*shape, d).h, Vec3(1, 0.8, 0.6).dot(d.cwiseAbs()), 1e-13);
+  }
+}
+
+TEST(Joints, gap_is_bounded_between_the_samples) {
+  // Two curves that meet at the five parameters at which edges are first compared, and not between them.
+  BezierPatch flat, wavy;
+  flat.degree_u = wavy.degree_u = 1;
+  flat.degree_v = 1;
+  wavy.degree_v = 7;
+  flat.points = {{0, 0, 0, 1}, {0, 1, 0, 1}, {1, 0, 0, 1}, {1, 1, 0, 1}};
+  // z = 1e-3 t (t - 1/4) (t - 1/2) (t - 3/4) (1 - t) (t + 1) (t + 2) in Bernstein form, by interpolation.
+  const auto z = [](double t) {
+    return 1e-3 * t * (t - 0.25) * (t - 0.5) * (t - 0.75) * (1 - t) * (t + 1) * (t + 2);
+  };
+  Eigen::Matrix<double, 8, 8> basis;
+  Eigen::Matrix<double, 8, 1> value;
+  for (int k = 0; k < 8; ++k) {
+    const double t = k / 7.0;
+    value[k] = z(t);
+    double b = 1;
+    for (int i = 0; i < 8; ++i) {
+      basis(k, i) = b * std::pow(t, i) * std::pow(1 - t, 7 - i);
+      b = b * (7 - i) / (i + 1);
+    }
+  }
+  const Eigen::Matrix<double, 8, 1> c = basis.fullPivLu().solve(value);
+  for (int i = 0; i < 2; ++i)
+    for (int j = 0; j < 8; ++j) wavy.points.push_back(Vec4(-i, j / 7.0, c[j], 1));
+  EdgeLink link;
+  link.patch = 1;
+  link.edge = 0;
+  double most = 0;
+  for (int k = 0; k <= 1000; ++k) most = std::max(most, std::abs(z(k / 1000.0)));
+  const double bound = bound_joint_gap(flat, 0, wavy, link);
+  EXPECT_GE(bound, most);
+  EXPECT_LE(bound, 1.2 * most);
+}
+
+TEST(Joints, kinks_are_bounded_and_signed) {
+  Random random(9);
+  for (const ShapePointer& shape :
+       {kinked(), cuboid(), make_shape("blocky", fitted_superellipsoid({1, 0.9, 0.8}, 4, 3))})
+    for (size_t p = 0; p < shape->patches.size(); ++p)
+      for (int e = 0; e < 4; ++e) {
+        const EdgeLink& link = shape->links[p][e];
+        EXPECT_LE(std::abs(link.kink), link.kink_bound * (1 + 1e-9) + 1e-12);
+        const double t = random.uniform(0.01, 0.99);
+        const Vec2 at = edge_parameters(e, t);
+        const SurfacePoint other = across(shape->patches, link, {static_cast<int>(p), at[0], at[1]}, e);
+        const LocalForm a = local_form(shape->patches[p], at[0], at[1]),
+                        b = local_form(shape->patches[other.patch], other.u, other.v);
+        EXPECT_LE(angle_between(a.normal, b.normal), link.kink_bound + 1e-9);
+        EXPECT_LE((a.point - b.point).norm(), link.gap + 1e-14);
+      }
+}
+
+// Gap of two bodies by minimising p over directions, supports by exhaustive search: nothing of the ladder.
+double least_overlap(const Particle& a, const Particle& b, const Vec3& near) {
+  const auto p = [&](const Vec3& d) {
+    return a.scale * exhaustive_support(*a.shape, a.q.conjugate() * d) +
+           b.scale * exhaustive_support(*b.shape, b.q.conjugate() * Vec3(-d)) - d.dot(b.x - a.x);
+  };
+  Vec3 best = near.normalized();
+  double least = p(best);
+  for (double stride = 0.05; stride > 1e-9; stride *= 0.5)
+    for (bool moved = true; moved;) {
+      moved = false;
+      const Vec3 t = best.unitOrthogonal(), s = best.cross(t);
+      for (int k = 0; k < 8; ++k) {
+        const Vec3 d =
+            (best + stride * (std::cos(M_PI * k / 4) * t + std::sin(M_PI * k / 4) * s)).normalized();
+        const double value = p(d);
+        if (value < least - 1e-15) least = value, best = d, moved = true;
+        if (moved) break;
+      }
+    }
+  return least;
+}
+
+TEST(SavedCase, mismatched_joints) {
+  const PairCase c = read_pair_case(case_file("mismatched-joints"));
+  std::vector<double> memory(kPairMemorySize, 0.0);
+  const ContactResult r = find_contact(c.a, c.b, c.settings, memory.data());
+  EXPECT_NE(r.status, Status::unresolved);
+  const double gap = -least_overlap(c.a, c.b, r.normal);
+  EXPECT_NEAR(r.gap, gap, c.settings.tolerance + 1e-9);
+  EXPECT_LE(r.lower, gap + 1e-9);
+  EXPECT_GE(r.upper, gap - 1e-9);
+}
+
+TEST(SavedCase, too_deep_ellipsoid) {
+  const PairCase c = read_pair_case(case_file("too-deep-ellipsoid-1-0.1-0.01"));
+  std::vector<double> memory(kPairMemorySize, 0.0);
+  const ContactResult r = find_contact(c.a, c.b, c.settings, memory.data());
+  EXPECT_NE(r.status, Status::unresolved);
+  EXPECT_NEAR(r.gap, -5.257e-4, 1e-7);
+  EXPECT_LE(r.lower, r.gap);
+}
+
+TEST(SavedCase, joint_gaps_are_in_the_bracket) {
+  const PairCase c = read_pair_case(case_file("joint-gaps"));
+  EXPECT_GT(c.a.shape->joint_slack, 0);
+  std::vector<double> memory(kPairMemorySize, 0.0);
+  const ContactResult r = find_contact(c.a, c.b, c.settings, memory.data());
+  const double gap = -least_overlap(c.a, c.b, r.normal);
+  EXPECT_LE(r.lower, gap + 1e-12);
+  EXPECT_GE(r.upper, gap - 1e-12);
+}
+
+}  // namespace
+}  // namespace nurbs
