@@ -297,7 +297,7 @@ int boundary_sense(int edge) {
 }  // namespace
 
 double projected_parameter(const BezierPatch& partner, const EdgeLink& link, const Vec3& x) {
-  return closest_parameter(partner, link.edge, x);
+  return refine_closest(partner, link.edge, x, closest_parameter(partner, link.edge, x));
 }
 
 UnmatchedEdge connect_patches(const std::vector<BezierPatch>& patches, double tolerance, PatchLinks& links) {

@@ -147,11 +147,11 @@ double rate_at(const BezierPatch& patch, double u, double v) {
   return most;
 }
 
-// The cell turned so that its pole is at u = 0 (a rotation of the parameters: normals stay outward).
-const Vec4& turned_point(const BezierPatch& patch, const Cell& cell, int i, int j) {
-  const int p = patch.degree_u, q = patch.degree_v;
-  const auto at = [&](int iu, int jv) -> const Vec4& { return cell.net[iu * (q + 1) + jv]; };
-  switch (cell.pole) {
+// Coefficient (i, j) of a net of degrees p, q, turned so that the pole is at u = 0 (a rotation of the
+// parameters: normals stay outward).
+const Vec4& turned_point(const std::vector<Vec4>& net, int p, int q, int pole, int i, int j) {
+  const auto at = [&](int iu, int jv) -> const Vec4& { return net[iu * (q + 1) + jv]; };
+  switch (pole) {
     case 1:
       return at(p - i, q - j);
     case 2:
@@ -160,6 +160,20 @@ const Vec4& turned_point(const BezierPatch& patch, const Cell& cell, int i, int 
       return at(j, q - i);
     default:
       return at(i, j);
+  }
+}
+
+// The cell's distance from the pole, in parameters.
+double from_pole(const Cell& c) {
+  switch (c.pole) {
+    case 0:
+      return c.u0;
+    case 1:
+      return 1 - c.u0 - c.du;
+    case 2:
+      return c.v0;
+    default:
+      return 1 - c.v0 - c.dv;
   }
 }
 
@@ -184,10 +198,11 @@ bool make_frame(const BezierPatch& patch, const Cell& cell, const Vec3& origin, 
   if (cell.pole == 1 || cell.pole == 3) su = -su;
   if (cell.pole == 1 || cell.pole == 2) sv = -sv;
   if (cell.pole == 2 || cell.pole == 3) suv = -suv;  // one of u and v is turned round, and they are exchanged
-  if (cell.pole >= 0) {                              // u = 1/2 there: x_v = u z_v
-    sv *= 2;
-    suv *= 2;
-    svv *= 4;
+  if (cell.pole >= 0) {                              // x_v = u z_v
+    const double u = from_pole(cell) + 0.5 * (cell.pole < 2 ? cell.du : cell.dv);
+    sv /= u;
+    suv /= u;
+    svv /= u * u;
   }
   const Vec3 n = su.cross(sv);
   const double e = -n.dot(suu), f = -n.dot(suv), g = -n.dot(svv), det = e * g - f * f;
@@ -296,19 +311,47 @@ Cell whole_patch(const std::vector<BezierPatch>& patches, int patch) {
   return cell;
 }
 
-std::pair<Cell, Cell> halve(const BezierPatch& patch, const Cell& cell, bool in_u) {
-  std::pair<Cell, Cell> halves{cell, cell};
-  const int count = in_u ? patch.degree_v + 1 : patch.degree_u + 1,
-            degree = in_u ? patch.degree_u : patch.degree_v;
-  const int stride = in_u ? patch.degree_v + 1 : 1, next = in_u ? 1 : patch.degree_v + 1;
-  for (int line = 0; line < count; ++line) {
-    Vec4* a = halves.first.net.data() + line * next;
-    Vec4* b = halves.second.net.data() + line * next;
+void set_pole(const BezierPatch& patch, int edge, Cell* cell) {
+  cell->pole = edge;
+  const int p = patch.degree_u, q = patch.degree_v, n = edge < 2 ? p : q;
+  const Vec4& corner = cell->net[edge % 2 ? cell->net.size() - 1 : 0];
+  const Vec3 pole = corner.head<3>() / corner[3];
+  cell->z.clear();
+  for (int i = 0; i <= p; ++i)
+    for (int j = 0; j <= q; ++j) {
+      const int k = edge < 2 ? i : j, away = edge % 2 ? n - k : k;  // from the pole
+      if (away == 0) continue;
+      const Vec4& c = cell->net[i * (q + 1) + j];
+      Vec4 z = Vec4::Zero();
+      z.head<3>() = static_cast<double>(n) / away * (c.head<3>() - c[3] * pole);
+      cell->z.push_back(z);
+    }
+}
+
+namespace {
+
+// `a` keeps the lower half of a net, `b`, a copy of it, gets the upper one (de Casteljau).
+void halve_net(int p, int q, bool in_u, std::vector<Vec4>* net_a, std::vector<Vec4>* net_b) {
+  const int lines = in_u ? q + 1 : p + 1, degree = in_u ? p : q, stride = in_u ? q + 1 : 1,
+            next = in_u ? 1 : q + 1;
+  for (int line = 0; line < lines; ++line) {
+    Vec4* a = net_a->data() + line * next;
+    Vec4* b = net_b->data() + line * next;
     for (int i = 0; i <= degree; ++i) {
       b[(degree - i) * stride] = a[degree * stride];
       for (int k = degree; k > i; --k) a[k * stride] = 0.5 * (a[k * stride] + a[(k - 1) * stride]);
     }
   }
+}
+
+}  // namespace
+
+std::pair<Cell, Cell> halve(const BezierPatch& patch, const Cell& cell, bool in_u) {
+  std::pair<Cell, Cell> halves{cell, cell};
+  const int p = patch.degree_u, q = patch.degree_v;
+  halve_net(p, q, in_u, &halves.first.net, &halves.second.net);
+  if (cell.pole >= 0)
+    halve_net(cell.pole < 2 ? p - 1 : p, cell.pole < 2 ? q : q - 1, in_u, &halves.first.z, &halves.second.z);
   if (in_u) {
     halves.first.du = halves.second.du = 0.5 * cell.du;
     halves.second.u0 += 0.5 * cell.du;
@@ -316,8 +359,6 @@ std::pair<Cell, Cell> halve(const BezierPatch& patch, const Cell& cell, bool in_
     halves.first.dv = halves.second.dv = 0.5 * cell.dv;
     halves.second.v0 += 0.5 * cell.dv;
   }
-  if (cell.pole == (in_u ? 0 : 2)) halves.second.pole = -1;
-  if (cell.pole == (in_u ? 1 : 3)) halves.first.pole = -1;
   return halves;
 }
 
@@ -331,43 +372,41 @@ CellBounds enclose(const BezierPatch& patch, const Cell& cell, bool with_rate) {
   const int rows = turned ? patch.degree_v : patch.degree_u,
             columns = turned ? patch.degree_u : patch.degree_v;
   const bool third = with_rate || polar;
-  const Vec4& corner = turned_point(patch, cell, 0, 0);
-  const Vec3 origin = polar ? Vec3(corner.head<3>() / corner[3])
-                            : evaluate0(patch, cell.u0 + 0.5 * cell.du, cell.v0 + 0.5 * cell.dv);
+  const double start = polar ? from_pole(cell) : 0, length_u = turned ? cell.dv : cell.du;
+  const bool touches = start == 0;
+  const Vec3 middle = evaluate0(patch, cell.u0 + 0.5 * cell.du, cell.v0 + 0.5 * cell.dv);
   Frame frame;
-  if (!make_frame(patch, cell, origin, &frame)) return out;
+  if (!make_frame(patch, cell, middle, &frame)) return out;
   out.seen_min = frame.min_radius;
   out.seen_max = frame.max_radius;
   out.seen_curvature = frame.least_curvature;
 
-  // The net in the frame's coordinates; of z, one degree less, at a pole.
+  // The net in the frame's coordinates; of z, one degree less, where there is a pole.
   double largest = 0, heaviest = 0;
   Net net, weight;
+  const int p = patch.degree_u, q = patch.degree_v;
   net.m = polar ? rows - 1 : rows;
   net.n = weight.n = columns;
   weight.m = rows;
+  const int zp = turned || !polar ? p : p - 1, zq = turned ? q - 1 : q;
   for (int i = 0; i <= rows; ++i)
     for (int j = 0; j <= columns; ++j) {
-      const Vec4& c = turned_point(patch, cell, i, j);
+      const Vec4& c = turned_point(cell.net, p, q, cell.pole, i, j);
       largest = std::max(largest, c.head<3>().lpNorm<Eigen::Infinity>());
       heaviest = std::max(heaviest, c[3]);
-      Vec4 y;
-      y.head<3>() = frame.to * (c.head<3>() - c[3] * origin);
-      y[3] = c[3];
-      if (!polar) {
-        net.at(i, j) = y;
-        continue;
-      }
-      weight.at(i, j) = Vec4(0, 0, 0, c[3]);
-      if (i > 0) {
-        y *= static_cast<double>(rows) / i;
-        y[3] = 0;
-        net.at(i - 1, j) = y;
+      if (polar) {
+        weight.at(i, j) = Vec4(0, 0, 0, c[3]);
+        if (i == rows) continue;
+        const Vec4& z = turned_point(cell.z, zp, zq, cell.pole, i, j);
+        net.at(i, j) << frame.to * z.head<3>(), 0;
+      } else {
+        net.at(i, j) << frame.to * (c.head<3>() - c[3] * middle), c[3];
       }
     }
   Vec4 noise;
   noise.head<3>() = kNetRoundoff * (frame.to.cwiseAbs() *
-                                    Vec3::Constant(largest + heaviest * origin.lpNorm<Eigen::Infinity>()));
+                                    Vec3::Constant(largest + heaviest * middle.lpNorm<Eigen::Infinity>()));
+  if (polar) noise.head<3>() *= rows;
   noise[3] = patch.rational ? kNetRoundoff * heaviest : 0;
   Hulls hulls;
   hulls_of(net, noise, third, &hulls);
@@ -381,19 +420,29 @@ CellBounds enclose(const BezierPatch& patch, const Cell& cell, bool with_rate) {
 
   // The basis of the tangent plane, the normal N and the form D in that basis, frame's coordinates.
   AffineVector tangent_u = y[kU], tangent_v = y[kV], normal;
+  AffineVector uu = y[kUU], uv = y[kUV], vv = y[kVV];  // x_ij in that basis
   FormMatrix form;
+  const AffineForm u{start + 0.5 * length_u, 0.5 * length_u, 0, 0};
+  AffineForm over_u;
   if (polar) {
-    const AffineForm u{0.5, 0.5, 0, 0};
-    const AffineVector z_u2 = 2 * y[kU] + u * y[kUU];
-    tangent_u = y[k0] + u * y[kU];
+    tangent_u = length_u * y[k0] + u * y[kU];
     normal = cross(tangent_u, tangent_v);
-    const AffineVector normal_u = cross(z_u2, y[kV]) + cross(tangent_u, y[kUV]);
-    form = {-1.0 * dot(normal, z_u2), -1.0 * dot(normal, y[kUV]),
-            -1.0 * (dot(normal_u, y[kVV]) + dot(normal, y[kUVV]))};
+    uu = (2 * length_u) * y[kU] + u * y[kUU];
+    form = {-1.0 * dot(normal, uu), -1.0 * dot(normal, y[kUV]), {}};
+    if (touches) {
+      const AffineVector normal_u = cross(uu, y[kV]) + cross(tangent_u, y[kUV]);
+      form.c = (-1 / length_u) * (dot(normal_u, y[kVV]) + dot(normal, y[kUVV]));
+    } else {
+      over_u = inverse(u);
+      form.c = -1.0 * (over_u * dot(normal, y[kVV]));
+      uv = y[kUV] + length_u * (over_u * y[kV]);
+      vv = over_u * y[kVV];
+    }
   } else {
     normal = cross(tangent_u, tangent_v);
-    form = {-1.0 * dot(normal, y[kUU]), -1.0 * dot(normal, y[kUV]), -1.0 * dot(normal, y[kVV])};
+    form = {-1.0 * dot(normal, uu), -1.0 * dot(normal, uv), -1.0 * dot(normal, vv)};
   }
+
   // Axes t1, t2, n of the cell's middle.
   Mat3 axes;
   axes.col(2) = (frame.to.transpose() * normal.center()).normalized();
@@ -424,11 +473,12 @@ CellBounds enclose(const BezierPatch& patch, const Cell& cell, bool with_rate) {
   const auto size = [](const AffineVector& v) {
     return std::sqrt((square(v.x) + square(v.y) + square(v.z)).high());
   };
-  if (!polar) {
-    const double area = frame.det * length.low();
-    out.speed_u = area / (size(jv) * cell.du);
-    out.speed_v = area / (size(ju) * cell.dv);
-  }
+  const double area = frame.det * length.low();
+  double speed_u = area / size(jv), speed_v = area / size(ju);
+  if (polar) speed_v *= start;  // |x_v| = u |z_v|, |N| = u |N'|
+  if (turned) std::swap(speed_u, speed_v);
+  out.speed_u = speed_u / cell.du;
+  out.speed_v = speed_v / cell.dv;
 
   if (!(det.low() > 0 && form.a.low() > 0)) {
     bound_any_curvature(ju, jv, form, length.low(), &out);
@@ -440,15 +490,15 @@ CellBounds enclose(const BezierPatch& patch, const Cell& cell, bool with_rate) {
   // p_k = |N| D^-1 J' T_k; then W(T_k, T_l) = p_k . J' T_l.
   const AffineForm upright = inverse(m.z), slope[2] = {m.x * upright, m.y * upright};
   const AffineForm factor = length * inverse(det);
-  AffineForm jt[2][2], p[2][2];  // of T_k: along u, along v
+  AffineForm jt[2][2], dp[2][2];  // of T_k: along u, along v
   for (int k = 0; k < 2; ++k) {
     jt[k][0] = (k == 0 ? ju.x : ju.y) - slope[k] * ju.z;
     jt[k][1] = (k == 0 ? jv.x : jv.y) - slope[k] * jv.z;
-    p[k][0] = factor * (form.c * jt[k][0] - form.b * jt[k][1]);
-    p[k][1] = factor * (form.a * jt[k][1] - form.b * jt[k][0]);
+    dp[k][0] = factor * (form.c * jt[k][0] - form.b * jt[k][1]);
+    dp[k][1] = factor * (form.a * jt[k][1] - form.b * jt[k][0]);
   }
-  const FormMatrix w{p[0][0] * jt[0][0] + p[0][1] * jt[0][1], p[0][0] * jt[1][0] + p[0][1] * jt[1][1],
-                     p[1][0] * jt[1][0] + p[1][1] * jt[1][1]};
+  const FormMatrix w{dp[0][0] * jt[0][0] + dp[0][1] * jt[0][1], dp[0][0] * jt[1][0] + dp[0][1] * jt[1][1],
+                     dp[1][0] * jt[1][0] + dp[1][1] * jt[1][1]};
   // A unit tangent is q1 T1 + q2 T2 with cos(cone) <= |q| <= 1.
   const Range radii = eigenvalues(w);
   const double upright2 = std::cos(out.cone) * std::cos(out.cone);
@@ -456,23 +506,31 @@ CellBounds enclose(const BezierPatch& patch, const Cell& cell, bool with_rate) {
   const double shortest2 = length.low() * length.low();
   const double product = shortest2 * shortest2 / det.high() * frame.det * frame.det;
   out.min_radius = std::max({0.0, radii.low * upright2, product / radii.high});
-  if (polar || !with_rate) return out;
+  if ((polar && touches) || !with_rate) return out;
   out.seen_rate = rate_at(patch, cell.u0 + 0.5 * cell.du, cell.v0 + 0.5 * cell.dv);
 
   // The third-order form C(t, t, t) = 3 t . x_ij p_i p_j + n . x_ijk p_i p_j p_k.
-  const AffineVector uu = back * y[kUU], uv = back * y[kUV], vv = back * y[kVV];
+  const AffineVector at_uu = back * uu, at_uv = back * uv, at_vv = back * vv;
   const auto second = [&](int k, int l) {
-    return (p[k][0] * p[l][0]) * uu + (p[k][0] * p[l][1] + p[k][1] * p[l][0]) * uv + (p[k][1] * p[l][1]) * vv;
+    return (dp[k][0] * dp[l][0]) * at_uu + (dp[k][0] * dp[l][1] + dp[k][1] * dp[l][0]) * at_uv +
+           (dp[k][1] * dp[l][1]) * at_vv;
   };
   const AffineVector x11 = second(0, 0), x12 = second(0, 1), x22 = second(1, 1);
   const auto along = [&](const AffineVector& x, int k) { return (k == 0 ? x.x : x.y) - slope[k] * x.z; };
   const AffineForm shorter = inverse(length);
-  const AffineForm t0 = shorter * dot(normal, y[kUUU]), t1 = shorter * dot(normal, y[kUUV]),
-                   t2 = shorter * dot(normal, y[kUVV]), t3 = shorter * dot(normal, y[kVVV]);
+  AffineVector uuu = y[kUUU], uuv = y[kUUV], uvv = y[kUVV], vvv = y[kVVV];  // x_ijk in the basis
+  if (polar) {
+    uuu = (3 * length_u) * y[kUU] + u * y[kUUU];
+    uuv = y[kUUV] + (2 * length_u) * (over_u * y[kUV]);
+    uvv = over_u * (y[kUVV] + length_u * (over_u * y[kVV]));
+    vvv = over_u * (over_u * y[kVVV]);
+  }
+  const AffineForm t0 = shorter * dot(normal, uuu), t1 = shorter * dot(normal, uuv),
+                   t2 = shorter * dot(normal, uvv), t3 = shorter * dot(normal, vvv);
   const auto bend = [&](int k, int l, int i) {
-    const AffineForm u2 = p[k][0] * p[l][0], mixed = p[k][0] * p[l][1] + p[k][1] * p[l][0],
-                     v2 = p[k][1] * p[l][1];
-    return p[i][0] * (u2 * t0 + mixed * t1 + v2 * t2) + p[i][1] * (u2 * t1 + mixed * t2 + v2 * t3);
+    const AffineForm u2 = dp[k][0] * dp[l][0], mixed = dp[k][0] * dp[l][1] + dp[k][1] * dp[l][0],
+                     v2 = dp[k][1] * dp[l][1];
+    return dp[i][0] * (u2 * t0 + mixed * t1 + v2 * t2) + dp[i][1] * (u2 * t1 + mixed * t2 + v2 * t3);
   };
   const AffineForm c[4] = {
       3 * along(x11, 0) + bend(0, 0, 0), 2 * along(x12, 0) + along(x11, 1) + bend(0, 0, 1),

@@ -8,12 +8,12 @@
 // a needle needs no more cells than a sphere to be proven convex. Then, with N = x_u cross x_v, the inverse
 // Weingarten map is W = |N| J D^-1 J', J = (x_u, x_v).
 //
-// Next to a pole, which a collapsed edge u = 0 is, x = pole + u z(u, v) with z the quotient of nets of degree
-// one less. N = u N', N' = (z + u z_u) cross z_v, and in the basis (x_u, z_v) D is u times (E, F; F, G) with
-// E = -N' . (2 z_u + u z_uu), F = -N' . z_uv and u G = -N' . z_vv. Where the pole is smooth N' . z_vv
-// vanishes at u = 0 (all z(0, v) are tangents), so G is enclosed by the derivative of that product with
-// respect to u (mean value theorem), and everything is regular: W = |N'| (x_u, z_v) (E, F; F, G)^-1 (x_u,
-// z_v)'.
+// On a patch with a pole, which a collapsed edge u = 0 is, x = pole + u z(u, v) with z the quotient of nets
+// of degree one less. N = u N', N' = (z + u z_u) cross z_v, and in the basis (x_u, z_v) D is u times (E, F;
+// F, G) with E = -N' . (2 z_u + u z_uu), F = -N' . z_uv and u G = -N' . z_vv: W = |N'| (x_u, z_v) (E, F; F,
+// G)^-1 (x_u, z_v)'. Where the pole is smooth N' . z_vv vanishes at u = 0 (all z(0, v) are tangents), so that
+// in a cell that touches the pole G is enclosed by the derivative of that product with respect to u (mean
+// value theorem): everything is regular there.
 #pragma once
 
 #include <utility>
@@ -26,9 +26,10 @@ namespace nurbs {
 // A rectangle of a patch with its own net.
 struct Cell {
   int patch = 0;
-  int pole = -1;  // edge that is a smooth pole and borders the cell, or -1
+  int pole = -1;  // edge of the patch that is a smooth pole, or -1
   double u0 = 0, v0 = 0, du = 1, dv = 1;
   std::vector<Vec4> net;  // homogeneous, v fastest
+  std::vector<Vec4> z;    // (z w, 0) of a patch with a pole, one degree less towards it
 };
 
 struct CellBounds {
@@ -48,6 +49,8 @@ struct CellBounds {
 };
 
 Cell whole_patch(const std::vector<BezierPatch>& patches, int patch);
+// Names the pole of a whole patch.
+void set_pole(const BezierPatch& patch, int edge, Cell* cell);
 std::pair<Cell, Cell> halve(const BezierPatch& patch, const Cell& cell, bool in_u);
 
 // Bounds over a cell; `with_rate` costs as much again. About 1 us for a biquartic patch.

@@ -21,42 +21,35 @@ bool smooth_pole(const EdgeLink& link, double size) {
   return link.collapsed && link.kink_bound <= kNoKink && link.gap <= kJointRoundoff * size;
 }
 
-bool touches(const Cell& c, int edge) {
-  switch (edge) {
-    case 0:
-      return c.u0 == 0;
-    case 1:
-      return c.u0 + c.du == 1;
-    case 2:
-      return c.v0 == 0;
-    default:
-      return c.v0 + c.dv == 1;
-  }
-}
-
-// Halves at once; the pole's strip first, so that cells lie in one or outside.
+// Strips at poles first, so that cells lie in one or outside. Of a patch with a pole at either end each half
+// has its own; one with poles at neighbouring edges has none that serves.
 std::vector<Cell> first_cells(const Shape& shape, const std::vector<BezierPatch>& even, int patch) {
-  std::vector<Cell> cells = {whole_patch(even, patch)};
-  for (int edge = 0; edge < 4; ++edge) {
-    const EdgeLink& link = shape.links[patch][edge];
-    if (!link.collapsed) continue;
-    std::vector<Cell> next;
-    for (Cell& c : cells) {
-      if (!touches(c, edge)) {
-        next.push_back(std::move(c));
-        continue;
+  const auto& links = shape.links[patch];
+  const BezierPatch& surface = even[patch];
+  const Cell whole = whole_patch(even, patch);
+  const auto smooth = [&](int edge) { return smooth_pole(links[edge], shape.bounding_radius); };
+  std::vector<Cell> cells;
+  for (const int low : {0, 2}) {
+    if (!links[low].collapsed && !links[low + 1].collapsed) continue;
+    if (links[2 - low].collapsed || links[3 - low].collapsed) return {whole};
+    for (const int edge : {low, low + 1}) {
+      Cell c = whole;
+      const int pole = smooth(edge)                                           ? edge
+                       : !links[edge].collapsed && smooth(low + 1 - edge % 2) ? low + 1 - edge % 2
+                                                                              : -1;
+      if (pole >= 0) set_pole(surface, pole, &c);
+      auto [first, second] = halve(surface, c, edge < 2);
+      c = edge % 2 ? std::move(second) : std::move(first);
+      while (links[edge].collapsed && (edge < 2 ? c.du : c.dv) > kPoleStrip) {
+        auto [lower, upper] = halve(surface, c, edge < 2);
+        cells.push_back(edge % 2 ? std::move(lower) : std::move(upper));
+        c = edge % 2 ? std::move(upper) : std::move(lower);
       }
-      if (smooth_pole(link, shape.bounding_radius)) c.pole = edge;
-      while ((edge < 2 ? c.du : c.dv) > kPoleStrip) {
-        auto [low, high] = halve(even[patch], c, edge < 2);
-        next.push_back(edge % 2 ? std::move(low) : std::move(high));
-        c = edge % 2 ? std::move(high) : std::move(low);
-      }
-      next.push_back(std::move(c));
+      cells.push_back(std::move(c));
     }
-    cells.swap(next);
+    return cells;
   }
-  return cells;
+  return {whole};
 }
 
 bool in_pole_strip(const Shape& shape, const Cell& c) {
@@ -131,7 +124,9 @@ class Bounder {
         ++out_.cells;
         add(std::move(leaf), 0);
       }
-    halve_while([this](const Open& o) { return radii_loose(o); }, kMostCells + kMostCellsPerPatch * patches_);
+    const int most = kMostCells + kMostCellsPerPatch * patches_;
+    if (!sphere_) halve_while([this](const Open& o) { return least_loose(o); }, most / 2);
+    halve_while([this](const Open& o) { return radii_loose(o); }, most);
     begin_rates();
     halve_while([this](const Open& o) { return rate_loose(o); },
                 out_.cells + kMostRateCells + kMostCellsPerPatch * patches_);
@@ -160,8 +155,8 @@ class Bounder {
 
   void add(Leaf leaf, int depth) {
     const CellBounds& b = leaf.bounds;
+    if (b.seen_min > 0) out_.seen_min = std::min(out_.seen_min, b.seen_min);
     if (b.seen_curvature > 0) {
-      out_.seen_min = std::min(out_.seen_min, b.seen_min);
       out_.seen_max = std::max(out_.seen_max, b.seen_max);
     }
     see_rate(leaf);
@@ -185,6 +180,11 @@ class Bounder {
         add(std::move(b), o.depth + 1);
       }
     }
+  }
+
+  // The least radius first: with none at all no ball rolls inside, and every answer is dear.
+  bool least_loose(const Open& o) const {
+    return o.leaf.bounds.min_radius < out_.seen_min / kRadiusTightness;
   }
 
   bool radii_loose(const Open& o) const {

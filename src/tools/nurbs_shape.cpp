@@ -17,6 +17,7 @@
 #include "body/mass_properties.h"
 #include "body/shape.h"
 #include "body/support.h"
+#include "body/proofs.h"
 #include "io/shape_file.h"
 #include "nurbs/affine.h"
 #include "shapes/primitives.h"
@@ -636,6 +637,7 @@ void check(const std::string& file) {
   std::printf("%s: usable: closed, outward%s, %zu patches, worst kink %.3g degrees, concavity %.3g\n",
               file.c_str(), warnings.empty() ? ", convex" : "", shape->surfaces.size(),
               std::max(kinks.opening, kinks.closing), shape->concavity);
+  for (const std::string& line : describe_proofs(*shape)) std::printf("  %s\n", line.c_str());
 }
 
 // Sub-command `make`, with one of its own for every kind of body.

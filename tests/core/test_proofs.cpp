@@ -95,10 +95,8 @@ void expect_encloses(const Shape& shape, int patch, const Cell& cell, Random& ra
     const Vec3 n = j.su.cross(j.sv);
     if (!(n.norm() > 1e-9 * j.su.norm() * j.sv.norm())) continue;
     ASSERT_LE(angle_between(b.axis, n), b.cone * (1 + 1e-9) + 1e-7) << shape.name;
-    if (cell.pole < 0) {
-      EXPECT_GE(n.norm() / j.sv.norm(), b.speed_u * (1 - 1e-9));
-      EXPECT_GE(n.norm() / j.su.norm(), b.speed_v * (1 - 1e-9));
-    }
+    EXPECT_GE(n.norm() / j.sv.norm(), b.speed_u * (1 - 1e-9));
+    EXPECT_GE(n.norm() / j.su.norm(), b.speed_v * (1 - 1e-9));
     const LocalForm f = local_form(shape.patches[patch], u, v);
     if (f.u != u || f.v != v) continue;
     EXPECT_GE(f.k_min, b.least_curvature - 1e-6 * f.k_max) << shape.name;
@@ -122,7 +120,7 @@ TEST(Enclosure, holds_at_every_point_of_every_cell) {
       const int patch = random.below(static_cast<int>(shape->patches.size()));
       Cell cell = whole_patch(shape->patches, patch);
       for (int edge = 0; edge < 4; ++edge)
-        if (shape->links[patch][edge].collapsed) cell.pole = edge;
+        if (shape->links[patch][edge].collapsed) set_pole(shape->patches[patch], edge, &cell);
       for (int depth = random.whole(4, 14); depth > 0; --depth) {
         auto [a, b] = halve(shape->patches[patch], cell, random.below(2));
         cell = random.below(2) ? a : b;
@@ -143,7 +141,7 @@ TEST(Enclosure, turned_polar_cells_are_the_same) {
       for (int edge = 0; edge < 4; ++edge) {
         if (!shape->links[p][edge].collapsed) continue;
         Cell cell = whole_patch(shape->patches, static_cast<int>(p));
-        cell.pole = edge;
+        set_pole(patch, edge, &cell);
         for (int k = 0; k < 4; ++k) {
           auto [across, beyond] = halve(patch, cell, edge < 2);
           cell = edge % 2 ? beyond : across;
@@ -154,7 +152,7 @@ TEST(Enclosure, turned_polar_cells_are_the_same) {
         EXPECT_TRUE(b.convex);
         EXPECT_LE(b.seen_max, b.max_radius);
         EXPECT_GE(b.seen_min, b.min_radius);
-        EXPECT_LT(b.max_radius, 1.5 * b.seen_max);
+        EXPECT_LT(b.max_radius, 2 * b.seen_max);
       }
     }
   }
@@ -229,7 +227,7 @@ TEST(Joints, mismatched_parameters_are_the_same_body) {
     EXPECT_TRUE(shape->smooth);
     EXPECT_LT(shape->proofs.joint_gap, 1e-14);
     EXPECT_LT(std::max(shape->proofs.opening, shape->proofs.closing), kNoKink);
-    EXPECT_EQ(shape->support_excess, 0);
+    EXPECT_LT(shape->support_excess, 1e-20);
     EXPECT_TRUE(shape->proofs.convex);
     for (int k = 0; k < 300; ++k) {
       const Vec3 d = random.direction();

@@ -637,6 +637,75 @@ PairCase dented_pair(Random& random, long) {
   return imperfect(random, a, b);
 }
 
+// Ellipsoids to 1000 : 1. Apart, the gap is by construction; overlaps are shallower than the sharpest tip.
+PairCase eccentric(Random& random, long) {
+  const Vec3 axes[] = {Vec3(1, 0.15, 0.03), Vec3(1, 0.1, 0.01),   Vec3(1, 1, 0.01),
+                       Vec3(1, 0.02, 0.02), Vec3(1, 0.03, 0.001), Vec3(1, 1, 0.001)};
+  const Body &body_a = ellipsoid(axes[random.below(6)]), &body_b = ellipsoid(axes[random.below(6)]);
+  const Side a{body_a, 1, ellipsoid_spot(body_a, random.direction())};
+  const Side b{body_b, random.uniform(0.5, 1.5), ellipsoid_spot(body_b, random.direction())};
+  return place(random, a, b, signed_gap(random, size_of(a, b), 1e-9, 1e-2));
+}
+
+// Ellipsoids to 30 : 1 that overlap by more than the sharpest tip has radius.
+PairCase eccentric_deep(Random& random, long) {
+  const Vec3 axes[] = {Vec3(1, 0.15, 0.03), Vec3(1, 0.1, 0.1), Vec3(1, 1, 0.05), Vec3(1, 0.5, 0.1)};
+  const Body &a = ellipsoid(axes[random.below(4)]), &b = ellipsoid(axes[random.below(4)]);
+  const Spot on_a = ellipsoid_spot(a, random.direction()), on_b = ellipsoid_spot(b, random.direction());
+  PairCase c = place(random, {a, 1, on_a}, {b, random.uniform(0.5, 1.5), on_b}, 1e-3);
+  c.b.x -= random.log_uniform(2e-3, 3e-2) * c.truth.normal;
+  c.truth = oracle_truth(c, a, b);
+  return c;
+}
+
+// An ellipsoid whose every patch has parameters of its own, u' = u / (u + c (1 - u)): the same surface.
+const Body& mismatched(int way) {
+  static std::map<int, Body> made;
+  Body& body = made[way];
+  if (body.shape) return body;
+  Random random(100 + way);
+  const Vec3 axes = way % 2 ? Vec3(1, 0.8, 0.6) : Vec3(1, 0.4, 0.3);
+  std::vector<NurbsSurface> surfaces = exact_ellipsoid(axes);
+  for (NurbsSurface& s : surfaces) {
+    const double u = random.log_uniform(0.1, 10), v = random.log_uniform(0.1, 10);
+    for (int i = 0; i < s.size_u; ++i)
+      for (int j = 0; j < s.size_v; ++j) s.point(i, j) *= std::pow(u, i) * std::pow(v, j);
+  }
+  return body = make_body("mismatched", std::move(surfaces), axes);
+}
+PairCase mismatched_joints(Random& random, long) {
+  const auto side = [&]() -> Side {
+    const Body& body = mismatched(random.below(6));
+    const bool joint = random.below(2);
+    const double t = random.uniform(0, 1);
+    return {body, random.uniform(0.5, 1.5),
+            joint ? spot_at(body, random.below(6), 0, t) : random_spot(body, random)};
+  };
+  const Side a = side(), b = side();
+  return place(random, a, b, signed_gap(random, size_of(a, b), 1e-9, 1e-2));
+}
+
+// Control points as a file with few digits has them: joints gape by that.
+const Body& rounded(int digits) {
+  static std::map<int, Body> made;
+  Body& body = made[digits];
+  if (body.shape) return body;
+  std::vector<NurbsSurface> surfaces = exact_ellipsoid(Vec3(1, 0.8, 0.6));
+  const double unit = std::pow(10.0, -digits);
+  for (NurbsSurface& s : surfaces)
+    for (Vec4& p : s.points) {
+      const double w = std::round(p[3] / unit) * unit;
+      for (int k = 0; k < 3; ++k) p[k] = w * std::round(p[k] / p[3] / unit) * unit;
+      p[3] = w;
+    }
+  return body = make_body("rounded", std::move(surfaces));
+}
+PairCase rounded_digits(Random& random, long) {
+  const Body &a = rounded(random.whole(6, 12)),
+             &b = random.below(2) ? rounded(random.whole(6, 12)) : pebble_of_size(1);
+  return imperfect(random, a, b);
+}
+
 }  // namespace
 
 const std::vector<Family>& all_families() {
@@ -665,6 +734,11 @@ const std::vector<Family>& all_families() {
       {"blocky faces", "fitted flat faces on each other and on plates", kSearched, blocky_faces},
       {"kinked", "joints open by mrad", kSearched, kinked_pair},
       {"dented", "joints dented by 1e-4", kSearched, dented_pair},
+      {"eccentric", "ellipsoids to 1000 : 1", kMany, eccentric},
+      {"eccentric deep", "ellipsoids to 30 : 1 that overlap by more than their tips' radii", kSearched,
+       eccentric_deep},
+      {"mismatched joints", "patches each with parameters of its own", kMany, mismatched_joints},
+      {"rounded digits", "control points of 6 to 12 decimals: joints gape", kSearched, rounded_digits},
   };
   return all;
 }
