@@ -186,8 +186,8 @@ struct Frame {
 };
 
 // From the surface at the cell's middle: unit tangents, and the second form's mean of unit size along the
-// third axis, which is the mean of the second derivatives (affine normal).
-bool make_frame(const BezierPatch& patch, const Cell& cell, const Vec3& origin, Frame* frame) {
+// third axis, which is the mean of the second derivatives (affine normal), or the normal if `upright`.
+bool make_frame(const BezierPatch& patch, const Cell& cell, const Vec3& origin, bool upright, Frame* frame) {
   const Jet2 j = evaluate2(patch, cell.u0 + 0.5 * cell.du, cell.v0 + 0.5 * cell.dv);
   Vec3 su = cell.du * j.su, sv = cell.dv * j.sv;
   Vec3 suu = cell.du * cell.du * j.suu, suv = cell.du * cell.dv * j.suv, svv = cell.dv * cell.dv * j.svv;
@@ -217,7 +217,10 @@ bool make_frame(const BezierPatch& patch, const Cell& cell, const Vec3& origin, 
   frame->min_radius = mean + split > 0 ? 1 / (mean + split) : kInfinity;
   Vec3 up = n / area;
   double height = std::sqrt(area);
-  if (det > 0 && e > 0) {
+  if (upright) {
+    const double mean_form = 0.5 * (std::abs(e) + std::abs(g)) / area;
+    if (mean_form > 0) height = mean_form;
+  } else if (det > 0 && e > 0) {
     const Vec3 affine = -(g * suu - 2 * f * suv + e * svv) / (2 * det);  // n . affine = 1
     const double size = 0.5 * (e + g);                                   // = - n . (suu + svv) / 2
     up = size * affine;
@@ -362,7 +365,9 @@ std::pair<Cell, Cell> halve(const BezierPatch& patch, const Cell& cell, bool in_
   return halves;
 }
 
-CellBounds enclose(const BezierPatch& patch, const Cell& cell, bool with_rate) {
+namespace {
+
+CellBounds enclose_in_frame(const BezierPatch& patch, const Cell& cell, bool with_rate, bool upright) {
   CellBounds out;
   out.max_radius = out.rate = kInfinity;
   out.least_curvature = -kInfinity;
@@ -376,7 +381,7 @@ CellBounds enclose(const BezierPatch& patch, const Cell& cell, bool with_rate) {
   const bool touches = start == 0;
   const Vec3 middle = evaluate0(patch, cell.u0 + 0.5 * cell.du, cell.v0 + 0.5 * cell.dv);
   Frame frame;
-  if (!make_frame(patch, cell, middle, &frame)) return out;
+  if (!make_frame(patch, cell, middle, upright, &frame)) return out;
   out.seen_min = frame.min_radius;
   out.seen_max = frame.max_radius;
   out.seen_curvature = frame.least_curvature;
@@ -488,7 +493,7 @@ CellBounds enclose(const BezierPatch& patch, const Cell& cell, bool with_rate) {
   out.least_curvature = 0;
   // Tangent vectors T_k that lie over t_k, and what parameters change by when the normal turns along them:
   // p_k = |N| D^-1 J' T_k; then W(T_k, T_l) = p_k . J' T_l.
-  const AffineForm upright = inverse(m.z), slope[2] = {m.x * upright, m.y * upright};
+  const AffineForm over_z = inverse(m.z), slope[2] = {m.x * over_z, m.y * over_z};
   const AffineForm factor = length * inverse(det);
   AffineForm jt[2][2], dp[2][2];  // of T_k: along u, along v
   for (int k = 0; k < 2; ++k) {
@@ -541,6 +546,16 @@ CellBounds enclose(const BezierPatch& patch, const Cell& cell, bool with_rate) {
                largest_cubic(c[0].b, c[1].b, c[2].b, c[3].b)) +
       std::sqrt(square2(c[0].r) + 3 * square2(c[1].r) + 3 * square2(c[2].r) + square2(c[3].r));
   return out;
+}
+
+}  // namespace
+
+CellBounds enclose(const BezierPatch& patch, const Cell& cell, bool with_rate) {
+  const CellBounds bounds = enclose_in_frame(patch, cell, with_rate, false);
+  if (bounds.convex || cell.pole < 0 || from_pole(cell) > 0) return bounds;
+  // At a flat pole the affine normal leans anywhere; what is proven in either frame is proven.
+  CellBounds upright = enclose_in_frame(patch, cell, with_rate, true);
+  return upright.convex || (upright.regular && upright.min_radius > bounds.min_radius) ? upright : bounds;
 }
 
 }  // namespace nurbs

@@ -155,10 +155,17 @@ double largest(const Vectors& f) {
   return most;
 }
 
-// Divides out the ends at which the normal vanishes: a pole lies there.
+// Divides out the ends at which the normal vanishes: a pole lies there. Compared with the coefficients beside
+// it: uneven parameters make those at the other end any size.
 void remove_end_roots(Vectors* f) {
+  const auto vanishes = [&] {
+    const size_t last = std::min<size_t>(f->size() - 1, 3);
+    double beside = 0;
+    for (size_t k = 1; k <= last; ++k) beside = std::max(beside, (*f)[k].norm());
+    return f->front().norm() <= kVanishing * beside;
+  };
   for (int end = 0; end < 2; ++end) {
-    while (f->size() > 1 && f->front().norm() <= kVanishing * largest(*f)) *f = without_root_at_0(*f);
+    while (f->size() > 1 && vanishes()) *f = without_root_at_0(*f);
     std::reverse(f->begin(), f->end());
   }
 }
