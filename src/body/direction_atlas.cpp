@@ -75,26 +75,11 @@ std::vector<Sample> sample_patches(const Shape& shape) {
   return samples;
 }
 
-// The best sample along d, and the best of another patch (a second local maximum can only hide across a
-// joint).
-void best_samples(const std::vector<Sample>& samples, const Vec3& d, const Sample** first,
-                  const Sample** second) {
-  double best = -1e300, next = -1e300;
-  *first = *second = nullptr;
-  for (const Sample& s : samples) {
-    const double h = d.dot(s.point);
-    if (h > best) {
-      best = h;
-      *first = &s;
-    }
-  }
-  for (const Sample& s : samples) {
-    const double h = d.dot(s.point);
-    if (s.where.patch != (*first)->where.patch && h > next) {
-      next = h;
-      *second = &s;
-    }
-  }
+const Sample& best_sample(const std::vector<Sample>& samples, const Vec3& d) {
+  const Sample* best = samples.data();
+  for (const Sample& s : samples)
+    if (d.dot(s.point) > d.dot(best->point)) best = &s;
+  return *best;
 }
 
 }  // namespace
@@ -111,15 +96,7 @@ DirectionAtlas make_atlas(const Shape& shape, int cells) {
     const Vec3 cube = atlas.direction(static_cast<int>(node));
     const double length = cube.norm();
     const Vec3 d = cube / length;
-    const Sample *first, *second;
-    best_samples(samples, d, &first, &second);
-    Support support = find_support(shape, d, &first->where);
-    if (second) {
-      const Support other = find_support(shape, d, &second->where);
-      const double upper = std::max(support.upper, other.upper);
-      if (other.h > support.h) support = other;
-      if (!(support.converged && other.converged)) support.upper = upper;
-    }
+    const Support support = find_hull_support(shape, d, &best_sample(samples, d).where);
     atlas.support[node] = support.upper * length;
     atlas.point[node] = support.point;
     atlas.where[node] = support.where;

@@ -216,9 +216,25 @@ Proofs summarise(const Shape& s, const SurfaceBounds& bounds, const KinkSummary&
   return proofs;
 }
 
+// What the search over patches needs (patch_maximum.h).
+void enclose_patches(Shape& s) {
+  s.bilinear = true;
+  for (const BezierPatch& patch : s.patches) {
+    s.bilinear &= patch.degree_u == 1 && patch.degree_v == 1;
+    Eigen::AlignedBox3d box;
+    for (const Vec4& p : patch.points) box.extend(Vec3(p.head<3>() / p[3]));
+    PatchBall ball{box.center(), 0};
+    for (const Vec4& p : patch.points)
+      ball.radius = std::max(ball.radius, (p.head<3>() / p[3] - ball.center).norm());
+    ball.radius *= 1 + 8 * kRoundoff;
+    s.balls.push_back(ball);
+  }
+}
+
 // The body's size, form and search tables. Each needs some of those above it.
 void measure(Draft& draft) {
   Shape& s = draft.shape;
+  enclose_patches(s);
   const RadiusBounds radius = bound_radius(s.patches);
   s.bounding_radius = radius.outer;
   s.inner_radius = radius.inner;

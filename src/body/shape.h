@@ -84,6 +84,12 @@ struct Proofs {
   bool sphere = false;                // within kSphere of one
 };
 
+// Ball that holds a patch's control points, and so the patch.
+struct PatchBall {
+  Vec3 center;
+  double radius;
+};
+
 struct Shape {
   std::string name;
   std::uint64_t stamp = 0;  // of the surfaces' contents: the same on every rank and across restarts
@@ -91,6 +97,8 @@ struct Shape {
   std::vector<BezierPatch> patches;    // exact Bezier split, moved so that the centre of mass is the origin
   std::vector<int> surface_of_patch;   // index into surfaces
   std::vector<std::array<EdgeLink, 4>> links;  // per Bezier patch
+  std::vector<PatchBall> balls;                // per Bezier patch
+  bool bilinear = false;                       // every patch is
   MassProperties mass;
   Mat3 gyration = Mat3::Zero();  // inertia / mass about the centre of mass, as used in motion
   Mat3 inverse_gyration = Mat3::Zero();

@@ -1,12 +1,14 @@
 // Projected Newton for the support mapping: maximise d . s(u, v) over one patch's unit square; where the
 // ascent leaves through an edge, continue in the neighbour if the ascent goes on there, otherwise stay on the
-// edge (one variable) or the corner (none).
+// edge (one variable) or the corner (none). The normal at the end certifies the answer; where there is none,
+// or it is no proof (poles, creases, corners, dents), the patches are searched in Bernstein form.
 #include "body/support.h"
 
 #include <algorithm>
 #include <cmath>
 
 #include "body/connectivity.h"
+#include "body/patch_maximum.h"
 #include "nurbs/tolerances.h"
 
 namespace nurbs {
@@ -43,35 +45,6 @@ bool ascends_into(const Jet1& jet, const SurfacePoint& at, int edge, const Vec3&
   const Vec3& other = pins_u(edge) ? jet.su : jet.sv;
   const double slope = pinned_value(edge) > 0 ? -d.dot(other) : d.dot(other);
   return slope > kSlopeTolerance * other.norm();
-}
-
-// At a pole the parametrisation is singular: among all patches that collapse there, finds the ray of steepest
-// ascent. Returns its slope (<= 0: the pole itself is the maximum) and where to go on.
-double leave_pole(const Shape& shape, const Vec3& pole, const Vec3& d, SurfacePoint* out) {
-  double best = 0;
-  const double near = kSamePole * shape.bounding_radius;
-  for (int p = 0; p < static_cast<int>(shape.patches.size()); ++p) {
-    for (int edge = 0; edge < 4; ++edge) {
-      if (!shape.links[p][edge].collapsed) continue;
-      for (const double t : {0.0, 0.25, 0.5, 0.75, 1.0}) {
-        SurfacePoint q{p, t, t};
-        (pins_u(edge) ? q.u : q.v) = pinned_value(edge);
-        const Jet2 jet = evaluate2(shape.patches[p], q.u, q.v);
-        if ((jet.s - pole).norm() > near) break;
-        const double slope = inward_slope({jet.s, jet.su, jet.sv}, edge, d);
-        if (slope <= best) continue;
-        best = slope;
-        *out = q;
-        // Where a parabola along the ray has its top: a start further out may overshoot the pole on its way
-        // back.
-        const double first = std::abs(d.dot(pins_u(edge) ? jet.su : jet.sv));
-        const double second = -d.dot(pins_u(edge) ? jet.suu : jet.svv);
-        const double inside = second > 0 ? std::min(kPoleRestart, first / second) : kPoleRestart;
-        (pins_u(edge) ? out->u : out->v) = pinned_value(edge) > 0 ? 1 - inside : inside;
-      }
-    }
-  }
-  return best;
 }
 
 // First and second derivatives of f = d . s, and the first fundamental form.
@@ -198,45 +171,23 @@ Step inward_step(const Model& m, double size, const SurfacePoint& at, bool free_
   return along;
 }
 
-// A pole of the patch, if it has one: the middle of a collapsed edge.
-bool find_pole(const Shape& shape, int patch, SurfacePoint* pole) {
-  for (int edge = 0; edge < 4; ++edge) {
-    if (!shape.links[patch][edge].collapsed) continue;
-    *pole = {patch, 0.5, 0.5};
-    (pins_u(edge) ? pole->u : pole->v) = pinned_value(edge);
-    return true;
-  }
-  return false;
-}
-
-// h(d) over d . (surface point), from the point's normal n.
-double excess_of(const Shape& shape, const Vec3& d, const Vec3& n) {
-  return rolling_excess(shape.curvature.max_radius, shape.bounding_radius, (d - n).squaredNorm());
-}
-
-// Next to a pole normals are lost to round-off. The bound then comes from a surface point a little further
-// in, or from the pole itself, where the normal has a limit.
-double polar_upper_bound(const Shape& shape, const Vec3& d, const SurfacePoint& at) {
-  SurfacePoint in = at, pole = at;
-  in.u += in.u < 0.5 ? kPoleOffset : -kPoleOffset;
-  in.v += in.v < 0.5 ? kPoleOffset : -kPoleOffset;
-  const Jet1 jet = evaluate1(shape.patches[at.patch], in.u, in.v);
-  double upper = d.dot(jet.s) + excess_of(shape, d, jet.su.cross(jet.sv).normalized());
-  if (find_pole(shape, at.patch, &pole)) {
-    const Jet2 j = evaluate2(shape.patches[at.patch], pole.u, pole.v);
-    Vec3 n = j.su.squaredNorm() < j.sv.squaredNorm() ? j.suv.cross(j.sv) : j.su.cross(j.suv);
-    if (std::max(pole.u, pole.v) == 1) n = -n;
-    upper = std::min(upper, d.dot(j.s) + excess_of(shape, d, n.normalized()));
-  }
-  return upper + shape.support_excess + kRoundoff * shape.bounding_radius;
-}
-
-double upper_bound(const Shape& shape, double f, double slope) {
-  const double r = shape.bounding_radius;
-  double excess = 2 * r * slope;
-  if (std::isfinite(shape.curvature.max_radius))
-    excess = std::min(excess, shape.curvature.max_radius * slope * slope);  // P (1 - cos) <= P sin^2
-  return f + excess + shape.support_excess + kRoundoff * r;
+// What h(d) may exceed d . (surface point) by: from the point's normal, as in contact/certificate.h. Infinite
+// where the normal is round-off (poles, collapsed edges) or looks away from d.
+double excess_at(const Shape& shape, const Vec3& d, const SurfacePoint& at, const Vec3& su, const Vec3& sv) {
+  constexpr double kInfinity = std::numeric_limits<double>::infinity();
+  const Vec3 cross = su.cross(sv);
+  const double area2 = cross.squaredNorm(), product2 = su.squaredNorm() * sv.squaredNorm();
+  const double least = kPoleSpeed * shape.bounding_radius;
+  if (!(area2 > kLeastSine * kLeastSine * product2 && area2 > least * least * least * least))
+    return kInfinity;
+  const double area = std::sqrt(area2);
+  const Vec3 n = cross / area;
+  if (!(d.dot(n) > 0)) return kInfinity;
+  const double noise = kNormalNoise * std::sqrt(product2) / area;
+  const double chord = (d - n).norm() + noise, chord2 = chord * chord;
+  const RollingRadii radii = rolling_radii(shape, at, n);
+  if (chord2 <= kNormalMargin * kNormalMargin && radii.near < kFarAway) return 0.5 * radii.near * chord2;
+  return rolling_excess(radii.outer, shape.bounding_radius, chord2) + radii.slack;
 }
 
 // Ascent from `at` to a local maximum of d . s.
@@ -247,7 +198,6 @@ Support climb(const Shape& shape, const Vec3& d, SurfacePoint at) {
   Jet2 jet = evaluate2(shape.patches[at.patch], at.u, at.v);
   double f = d.dot(jet.s);
   double slope = 1;
-  int polar_restarts = 0;
   for (best.iterations = 1; best.iterations < kSupportIterations; ++best.iterations) {
     const Model model(jet, d);
     unsigned closed = 0;  // edges through which the ascent does not continue
@@ -255,16 +205,10 @@ Support climb(const Shape& shape, const Vec3& d, SurfacePoint at) {
     for (int edge; (edge = leaving_edge(at, model, closed)) >= 0;) {
       closed |= 1u << edge;
       const EdgeLink& link = shape.links[at.patch][edge];
-      SurfacePoint q;
-      if (link.collapsed) {
-        if (polar_restarts >= kPolarRestarts || leave_pole(shape, jet.s, d, &q) < kSlopeTolerance) continue;
-        ++polar_restarts;
-        moved = true;
-      } else if (link.patch >= 0) {
-        q = across(shape.patches, link, at, edge);
-        const Jet1 there = evaluate1(shape.patches[q.patch], q.u, q.v);
-        moved = ascends_into(there, q, link.edge, d);
-      }
+      if (link.collapsed || link.patch < 0) continue;
+      const SurfacePoint q = across(shape.patches, link, at, edge);
+      const Jet1 there = evaluate1(shape.patches[q.patch], q.u, q.v);
+      moved = ascends_into(there, q, link.edge, d);
       if (!moved) continue;
       at = q;
       jet = evaluate2(shape.patches[at.patch], at.u, at.v);
@@ -305,50 +249,76 @@ Support climb(const Shape& shape, const Vec3& d, SurfacePoint at) {
   best.slope = slope;
   best.point = jet.s;
   best.h = f;
-  const double lu = jet.su.squaredNorm(), lv = jet.sv.squaredNorm();
-  const bool polar = std::min(lu, lv) < kPoleOffset * kPoleOffset * std::max(lu, lv);
-  best.upper = polar ? std::max(f, polar_upper_bound(shape, d, at)) : upper_bound(shape, f, slope);
+  best.upper = f + excess_at(shape, d, at, jet.su, jet.sv) + kRoundoff * size;
   return best;
+}
+
+// The highest of all patches, knowing `low`, the height of some surface point.
+Support search_patches(const Shape& shape, const Vec3& d, const Support& low) {
+  const double slack = kSupportSlack * kRoundoff * shape.bounding_radius;
+  Highest top{low.where, low.h, low.h + slack, 0};
+  for (size_t p = 0; p < shape.patches.size(); ++p) {
+    const PatchBall& ball = shape.balls[p];
+    if (d.dot(ball.center) + ball.radius > top.h + slack)
+      raise(shape.patches[p], static_cast<int>(p), d, slack, &top);
+  }
+  Support s;
+  s.where = top.where;
+  s.point = evaluate0(shape.patches[top.where.patch], top.where.u, top.where.v);
+  s.h = d.dot(s.point);
+  s.upper = std::max(top.upper, s.h);
+  s.slope = 0;
+  s.iterations = low.iterations + top.boxes;
+  s.converged = s.upper - s.h <= 2 * slack;
+  return s;
+}
+
+SurfacePoint start_for(const Shape& shape, const Vec3& d, const SurfacePoint* start) {
+  if (start && start->patch >= 0 && start->patch < static_cast<int>(shape.patches.size())) return *start;
+  return shape.atlas.where[shape.atlas.nearest(d)];
+}
+
+// Bodies of bilinear patches have their support at a corner: nothing to climb.
+Support begin(const Shape& shape, const Vec3& d, const SurfacePoint& at) {
+  if (!shape.bilinear) return climb(shape, d, at);
+  Support s;
+  s.where = at;
+  s.h = d.dot(evaluate0(shape.patches[at.patch], at.u, at.v));
+  s.upper = std::numeric_limits<double>::infinity();
+  return s;
+}
+
+bool is_certain(const Shape& shape, const Support& s, double enough) {
+  return s.converged &&
+         s.upper - s.h <= std::max(enough, 2 * kSupportSlack * kRoundoff * shape.bounding_radius);
 }
 
 }  // namespace
 
 Support find_support(const Shape& shape, const Vec3& d, const SurfacePoint* start) {
-  Support best = climb(shape, d, start ? *start : shape.atlas.where[shape.atlas.nearest(d)]);
-  SurfacePoint from;
-  if (best.converged || !find_pole(shape, best.where.patch, &from)) return best;
-  // Lost on the wrong side of a pole, on a body nearly flat there: straight from the pole the right way.
-  const Vec3 pole = evaluate0(shape.patches[from.patch], from.u, from.v);
-  leave_pole(shape, pole, d, &from);
-  const Support other = climb(shape, d, from);
-  const int iterations = best.iterations + other.iterations;
-  if (other.h >= best.h) best = other;
-  best.iterations = iterations;
-  return best;
+  const Support local = begin(shape, d, start_for(shape, d, start));
+  if (is_certain(shape, local, 0) || (shape.dented() && std::isfinite(local.upper))) return local;
+  return search_patches(shape, d, local);
 }
 
-Support find_hull_support(const Shape& shape, const Vec3& d, const SurfacePoint* start) {
-  Support best = find_support(shape, d, start);
-  if (!shape.dented()) return best;
+Support find_hull_support(const Shape& shape, const Vec3& d, const SurfacePoint* start, double enough) {
+  const Support local = begin(shape, d, start_for(shape, d, start));
+  return is_certain(shape, local, enough) ? local : search_patches(shape, d, local);
+}
+
+double find_rival(const Shape& shape, const Vec3& d, const Support& best) {
+  double rival = -std::numeric_limits<double>::infinity();
+  if (!shape.dented()) return rival;
   const double radius = shape.normal_map.radius_at(d);
-  if (radius < kFarAway && best.converged && best.slope < 0.5 * kNormalMargin) {
-    // No dent near d: the only point with this normal.
-    best.upper = best.h + radius * best.slope * best.slope + kRoundoff * shape.bounding_radius;
-    return best;
-  }
+  if (radius < kFarAway) return rival;  // no dent near d: the only point with this normal
   int nodes[4];
   shape.atlas.cell(d, nodes);
   for (const int node : nodes) {
-    const Support other = find_support(shape, d, &shape.atlas.where[node]);
-    const int iterations = best.iterations + other.iterations;
-    const bool same = (other.point - best.point).norm() <= kSameSupport * shape.bounding_radius;
-    const double rival = same ? best.rival : std::max(best.rival, std::min(best.h, other.h));
-    if (other.h > best.h) best = other;
-    best.iterations = iterations;
-    best.rival = rival;
+    const Support other = climb(shape, d, shape.atlas.where[node]);
+    if ((other.point - best.point).norm() > kSameSupport * shape.bounding_radius)
+      rival = std::max(rival, std::min(best.h, other.h));
   }
-  best.upper -= shape.support_excess;
-  return best;
+  return rival;
 }
 
 SurfacePoint walk(const Shape& shape, SurfacePoint at, double du, double dv) {

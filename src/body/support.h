@@ -14,20 +14,26 @@ struct Support {
   double h = 0;               // d . point: a lower bound of the support function ...
   double upper = 0;           // ... and a certified upper bound
   double slope = 1;           // of d . x along the surface at the point, rad
-  double rival = -std::numeric_limits<double>::infinity();  // h of the best other local maximum met
-  int iterations = 0;
+  int iterations = 0;         // of Newton, and boxes of the search over patches
   bool converged = false;
 };
 
-// Support point of `shape` in unit direction d (shape frame), by box-constrained Newton in one Bezier patch
-// that moves to the neighbour through the links when a parameter leaves its patch. `start` nullptr: from the
-// atlas. Never fails: at the iteration cap the best point so far is returned with converged = false.
+// A local maximum of d . x over `shape`, d unit (shape frame), by box-constrained Newton in one Bezier patch
+// that moves to the neighbour through the links when a parameter leaves its patch. `start` nullptr (or of no
+// patch of the body): from the atlas. A body without dents has no other maximum than the support; where the
+// surface normal at the end does not prove the point to be it (poles, creases, corners, a start on the far
+// side), this is find_hull_support.
 Support find_support(const Shape& shape, const Vec3& d, const SurfacePoint* start = nullptr);
 
-// Support of the convex hull of a body with dents: the best of the local maxima reached from `start` and from
-// the corners of d's atlas cell, which lie on either side of the groove that d bridges. Its `upper` trusts
-// that search and leaves Shape::support_excess out. On a body without dents this is find_support.
-Support find_hull_support(const Shape& shape, const Vec3& d, const SurfacePoint* start = nullptr);
+// The support of the body's convex hull, whatever its patches look like. h and upper differ by `enough` at
+// most, a length, or by a few ulp of the bounding radius. 0.1 to 0.5 us where Newton's end is proven to be
+// the support, some us where the patches have to be searched (patch_maximum.h).
+Support find_hull_support(const Shape& shape, const Vec3& d, const SurfacePoint* start = nullptr,
+                          double enough = 0);
+
+// Of a body with dents: h of the best other local maximum reached from the corners of d's atlas cell, which
+// lie on either side of the groove that d bridges; -infinity if there is none.
+double find_rival(const Shape& shape, const Vec3& d, const Support& best);
 
 // Step (du, dv) from `at` in its patch's parameters, carried across edges through the links (orientation and
 // patch changes); collapsed edges and unmatched ends clamp.

@@ -103,8 +103,10 @@ class Ladder {
       s.bracket.direction = s.normal;
     }
     // Two supports differ by at most the diameter times the turn more than they did.
+    const double rival_a = find_rival(*pair.a, s.normal, a),
+                 rival_b = find_rival(*pair.b, pair.direction_on_b(s.normal), b);
     const double clear =
-        std::min((a.h - a.rival) / pair.a->bounding_radius, (b.h - b.rival) / pair.b->bounding_radius);
+        std::min((a.h - rival_a) / pair.a->bounding_radius, (b.h - rival_b) / pair.b->bounding_radius);
     s.turn = std::min(0.25 * clear, kNormalMargin);
     s.converged = s.bracket.width() <= tolerance;
     if (s.converged) s.gap = std::clamp(s.gap, s.bracket.lower, s.bracket.upper);

@@ -1,242 +1,155 @@
-// A growing convex hull of points of the configuration space obstacle; see polytope.h.
+// The search over directions on a growing hull of the configuration space obstacle; see polytope.h.
 #include "contact/polytope.h"
 
 #include <array>
 #include <cmath>
 
+#include "contact/growing_hull.h"
+#include "contact/joint_newton.h"
+
 namespace nurbs {
 namespace {
 
-struct Vertex {  // left uninitialised: hundreds lie on the stack
-  Vec3 g;        // a - b
-  Vec3 a, b;
-  int patch_a, patch_b;
-  double u_a, v_a, u_b, v_b;
+// What the hull's point of the same number came from. Left uninitialised: hundreds lie on the stack.
+struct Witness {
+  Vec3 a, b;  // of the shrunk bodies
+  Vec3 d;     // asked
+  SurfacePoint on_a, on_b;
 };
 
-struct Face {
-  std::array<int, 3> vertex;
-  std::array<int, 3> across;  // face on the other side of the edge vertex[k] -> vertex[k + 1]
-  Vec3 normal;                // unit, outward
-  double offset;              // normal . vertex: signed distance of the plane from the origin
-  bool alive;
-};
-
-// Nearest point to the origin on a triangle, as barycentric weights (Ericson 2005, section 5.1.5).
-Vec3 nearest_on_triangle(const Vec3& a, const Vec3& b, const Vec3& c) {
-  const Vec3 ab = b - a, ac = c - a;
-  const double d1 = -ab.dot(a), d2 = -ac.dot(a);
-  if (d1 <= 0 && d2 <= 0) return {1, 0, 0};
-  const double d3 = -ab.dot(b), d4 = -ac.dot(b);
-  if (d3 >= 0 && d4 <= d3) return {0, 1, 0};
-  const double vc = d1 * d4 - d3 * d2;
-  if (vc <= 0 && d1 >= 0 && d3 <= 0) {
-    const double t = d1 / (d1 - d3);
-    return {1 - t, t, 0};
-  }
-  const double d5 = -ab.dot(c), d6 = -ac.dot(c);
-  if (d6 >= 0 && d5 <= d6) return {0, 0, 1};
-  const double vb = d5 * d2 - d1 * d6;
-  if (vb <= 0 && d2 >= 0 && d6 <= 0) {
-    const double t = d2 / (d2 - d6);
-    return {1 - t, 0, t};
-  }
-  const double va = d3 * d6 - d5 * d4;
-  if (va <= 0 && d4 - d3 >= 0 && d5 - d6 >= 0) {
-    const double t = (d4 - d3) / ((d4 - d3) + (d5 - d6));
-    return {0, 1 - t, t};
-  }
-  const double sum = va + vb + vc;
-  if (!(sum > 0)) return {1, 0, 0};
-  return {va / sum, vb / sum, vc / sum};
+// d(support point)/d(direction) of a body at a surface point whose normal is d, in the tangent plane spanned
+// by t and s: J (-H)^-1 J^T with J the tangents there and H the second derivatives of d . x. False where the
+// surface has no such map.
+bool support_turn(const Shape& shape, const SurfacePoint& at, const Vec3& d, const Vec3& t, const Vec3& s,
+                  double scale, Mat2* turn) {
+  const Jet2 j = evaluate2(shape.patches[at.patch], at.u, at.v);
+  Mat2 tangents, bend;
+  tangents << t.dot(j.su), t.dot(j.sv), s.dot(j.su), s.dot(j.sv);
+  bend << -d.dot(j.suu), -d.dot(j.suv), -d.dot(j.suv), -d.dot(j.svv);
+  const double det = bend.determinant();
+  if (!(bend(0, 0) > 0 && det > kSingular * bend(0, 0) * bend(1, 1))) return false;
+  Mat2 inverse;
+  inverse << bend(1, 1), -bend(0, 1), -bend(0, 1), bend(0, 0);
+  *turn = scale / det * tangents * inverse * tangents.transpose();
+  return turn->allFinite();
 }
-
-int count_positive(const Vec3& w) {
-  return (w[0] > 0) + (w[1] > 0) + (w[2] > 0);
-}
-
-class Hull {
- public:
-  int vertices = 0, faces = 0;
-  bool broken = false;  // by round-off: the faces no longer close
-  double sliver = 0;    // height below which a triangle's normal is round-off; a length
-  Vertex vertex[kHullVertices];
-  Face face[kHullFaces];
-
-  // Starts from four vertices of positive volume; false when they are flat.
-  bool start(int a, int b, int c, int d) {
-    const Vec3 &p = vertex[a].g, &q = vertex[b].g, &r = vertex[c].g, &s = vertex[d].g;
-    const double volume = (q - p).cross(r - p).dot(s - p);
-    if (volume == 0 || !std::isfinite(volume)) return false;
-    if (volume > 0) std::swap(b, c);
-    // Outward faces of the tetrahedron and who lies across each edge.
-    add(a, b, c, {1, 2, 3});
-    add(b, a, d, {0, 3, 2});
-    add(c, b, d, {0, 1, 3});
-    add(a, c, d, {0, 2, 1});
-    return true;
-  }
-
-  // Adds the last vertex to the hull: removes the faces it sees and closes the horizon. False when it sees
-  // none (it lies inside up to round-off) or storage ends.
-  bool grow(int v, double eps) {
-    const Vec3& g = vertex[v].g;
-    int seen = -1;
-    double best = eps;
-    for (int f = 0; f < faces; ++f) {
-      if (!face[f].alive) continue;
-      const double height = face[f].normal.dot(g) - face[f].offset;
-      if (height > best) {
-        best = height;
-        seen = f;
-      }
-    }
-    if (seen < 0) return false;
-    broken = !replace_visible(v, seen);
-    return !broken;
-  }
-
- private:
-  struct Edge {
-    int from, to, outside;  // outside: the face that stays
-  };
-  Edge horizon[kHullFaces];
-  int stack[kHullFaces];
-  int freed[kHullFaces];
-  int freed_count = 0;
-
-  void set(int f, int a, int b, int c, const std::array<int, 3>& across) {
-    Face& n = face[f];
-    n.vertex = {a, b, c};
-    n.across = across;
-    const Vec3 &p = vertex[a].g, &q = vertex[b].g, &r = vertex[c].g;
-    Vec3 m = (q - p).cross(r - p);
-    const double length = m.norm();
-    const double base2 = std::max({(q - p).squaredNorm(), (r - q).squaredNorm(), (p - r).squaredNorm()});
-    if (length * length > sliver * sliver * base2) {
-      n.normal = m / length;
-      n.offset = std::min({n.normal.dot(p), n.normal.dot(q), n.normal.dot(r)});
-    } else {  // never chosen, seen by nothing
-      n.normal = Vec3::Zero();
-      n.offset = kFarAway;
-    }
-    n.alive = true;
-  }
-
-  void add(int a, int b, int c, const std::array<int, 3>& across) { set(faces++, a, b, c, across); }
-
-  bool replace_visible(int v, int first) {
-    const Vec3 g = vertex[v].g;
-    int top = 0, edges = 0;
-    int removed = 0;
-    stack[top++] = first;
-    face[first].alive = false;
-    freed[freed_count + removed++] = first;
-    while (top > 0) {
-      const int f = stack[--top];
-      for (int k = 0; k < 3; ++k) {
-        const int n = face[f].across[k];
-        if (!face[n].alive) continue;
-        const bool sliver = face[n].offset >= kFarAway;
-        if (sliver || face[n].normal.dot(g) > face[n].offset) {
-          face[n].alive = false;
-          freed[freed_count + removed++] = n;
-          stack[top++] = n;
-        }
-      }
-    }
-    for (int r = 0; r < removed; ++r) {
-      const Face& f = face[freed[freed_count + r]];
-      for (int k = 0; k < 3; ++k)
-        if (face[f.across[k]].alive) horizon[edges++] = {f.vertex[k], f.vertex[(k + 1) % 3], f.across[k]};
-    }
-    freed_count += removed;
-    if (edges < 3) return false;
-    // A fan over the horizon, chained edge by edge.
-    int first_new = -1, previous = -1;
-    int at = 0;
-    for (int step = 0; step < edges; ++step) {
-      const Edge& e = horizon[at];
-      int f;
-      if (freed_count > 0)
-        f = freed[--freed_count];
-      else if (faces < kHullFaces)
-        f = faces++;
-      else
-        return false;
-      set(f, e.from, e.to, v, {e.outside, -1, previous});
-      Face& outside = face[e.outside];
-      for (int k = 0; k < 3; ++k)
-        if (outside.vertex[k] == e.to && outside.vertex[(k + 1) % 3] == e.from) outside.across[k] = f;
-      if (previous >= 0) face[previous].across[1] = f;
-      if (first_new < 0) first_new = f;
-      previous = f;
-      if (step + 1 == edges) break;
-      int next = -1;
-      for (int k = 0; k < edges; ++k)
-        if (horizon[k].from == e.to) next = k;
-      if (next < 0) return false;
-      at = next;
-    }
-    face[previous].across[1] = first_new;
-    face[first_new].across[2] = previous;
-    return horizon[at].to == horizon[0].from;
-  }
-};
 
 // Everything the search over directions keeps.
 class Search {
  public:
   Search(const PairFrame& pair, double tolerance, double joggle)
-      : pair_(pair), tolerance_(tolerance), joggle_(joggle) {
+      : pair_(pair), tolerance_(tolerance), joggle_(joggle), hull_(kSliver * pair.reach) {
     shrink_a_ = pair.scale_a * pair.a->curvature.min_radius;
     shrink_b_ = pair.scale_b * pair.b->curvature.min_radius;
     (shrink_a_ < shrink_b_ ? shrink_a_ : shrink_b_) *= kCoreShare;
     shrink_ = shrink_a_ + shrink_b_;
-    hull_.sliver = kSliver * pair.reach;
   }
 
-  // Support pair along unit d as a new vertex; tightens the lower bound of the gap.
-  int query(const Vec3& d) {
-    if (hull_.vertices == kHullVertices) return -1;
+  // Builds the first solid: along the seed and three directions that make a tetrahedron with it; where those
+  // are too flat, the axes as well.
+  bool start(const Vec3& seed) {
+    const Vec3 d = seed.squaredNorm() > 0 ? Vec3(seed.normalized()) : Vec3(Vec3::UnitX());
+    const Vec3 t = d.unitOrthogonal(), s = d.cross(t);
+    query(d, -1);
+    for (const double angle : {0.0, 2.0943951023931953, 4.1887902047863905})
+      query(-d / 3 + 0.9428090415820634 * (std::cos(angle) * t + std::sin(angle) * s), -1);
+    if (start_from_points(kFlatStart)) return true;
+    for (int k = 0; k < 3; ++k)
+      for (const double sign : {1.0, -1.0}) query(sign * Vec3::Unit(k), -1);
+    return start_from_points(0);
+  }
+
+  void run(double enough) {
+    surround_best();
+    int settled = best_, polishes = 0, since = 0;
+    while (hull_.points() < kHullVertices) {
+      const int near = best_face();
+      if (near < 0 || upper_ - lower_ <= tolerance_ || lower_ > enough) return;
+      if (best_ != settled && ++since > kPolishAfter && polishes < kMostPolishes) {
+        // Another minimum than the seed's: straight to it.
+        since = 0;
+        ++polishes;
+        if (polish()) surround_best();
+        settled = best_;
+        continue;
+      }
+      const int start = closest_of(hull_.face(near), direction_to_ask_);
+      const int v = query(direction_to_ask_, start);
+      if (v < 0 || upper_ - lower_ <= tolerance_) return;
+      if (hull_.grow(v, least_height()) != GrowingHull::Growth::grown) return;
+    }
+  }
+
+  PolytopeResult result() const {
+    PolytopeResult r;
+    r.iterations = queries_;
+    r.bracket.lower = lower_;
+    r.bracket.upper = std::max(upper_, lower_);
+    r.converged = upper_ - lower_ <= tolerance_;
+    r.bracket.direction = direction_;
+    r.points.na = direction_;
+    r.points.nb = -direction_;
+    const Witness& w = witness_[best_];
+    Vec3 a = w.a, b = w.b;
+    find_witness(&a, &b);
+    r.points.a = a + shrink_a_ * direction_;
+    r.points.b = b - shrink_b_ * direction_;
+    r.points.on_a = w.on_a;
+    r.points.on_b = w.on_b;
+    const double apart = direction_.dot(r.points.b - r.points.a);
+    // Where the bracket stayed open, the least overlap seen: the hull errs to first order, the direction to
+    // second.
+    r.gap = r.converged ? std::clamp(apart, r.bracket.lower, r.bracket.upper) : r.bracket.lower;
+    // The hull lies inside the obstacle, by less than the witnesses are known sideways.
+    r.points.a += 0.5 * (apart - r.gap) * direction_;
+    r.points.b -= 0.5 * (apart - r.gap) * direction_;
+    return r;
+  }
+
+ private:
+  double roundoff() const { return kRoundoff * pair_.reach + 2 * joggle_; }
+  // A point less high above a face than this is not worth adding: the bracket is as good as closed there.
+  double least_height() const { return std::max(0.25 * roundoff(), kLeastHeight * tolerance_); }
+
+  // Support pair along unit d as a new point; tightens the lower bound of the gap. `near`: a point whose
+  // supports are worth starting from, or -1.
+  int query(const Vec3& d, int near) {
+    const int v = hull_.points();
+    if (v == kHullVertices) return -1;
     const Vec3 on_b = pair_.direction_on_b(d);
-    const Support sa = find_hull_support(*pair_.a, d), sb = find_hull_support(*pair_.b, on_b);
-    Vertex& v = hull_.vertex[hull_.vertices];
-    v.a = pair_.place_a(sa.point) - shrink_a_ * d;
-    v.b = pair_.place_b(sb.point) + shrink_b_ * d;
-    v.g = v.a - v.b;
-    if (joggle_ > 0) v.g += joggle_ * scatter(v.g);
-    v.patch_a = sa.where.patch;
-    v.u_a = sa.where.u;
-    v.v_a = sa.where.v;
-    v.patch_b = sb.where.patch;
-    v.u_b = sb.where.u;
-    v.v_b = sb.where.v;
+    const double enough = kSupportShare * tolerance_;
+    const Support sa = find_hull_support(*pair_.a, d, near < 0 ? nullptr : &witness_[near].on_a,
+                                         enough / pair_.scale_a),
+                  sb = find_hull_support(*pair_.b, on_b, near < 0 ? nullptr : &witness_[near].on_b,
+                                         enough / pair_.scale_b);
+    Witness& w = witness_[v];
+    w.a = pair_.place_a(sa.point) - shrink_a_ * d;
+    w.b = pair_.place_b(sb.point) + shrink_b_ * d;
+    w.d = d;
+    w.on_a = sa.where;
+    w.on_b = sb.where;
+    Vec3 g = w.a - w.b;
+    if (joggle_ > 0) g += joggle_ * scatter(g);
+    hull_.store(g);
     ++queries_;
     const double p = pair_.scale_a * sa.upper + pair_.scale_b * sb.upper - d.dot(pair_.offset);
     if (-p > lower_) {
       lower_ = -p;
       direction_ = d;
-      best_ = hull_.vertices;
+      best_ = v;
     }
-    return hull_.vertices++;
+    return v;
   }
 
-  bool start(const Vec3& seed) {
-    // A regular tetrahedron of directions turned towards the seed, then the six axes until a volume is found.
-    const Vec3 d = seed.squaredNorm() > 0 ? Vec3(seed.normalized()) : Vec3(Vec3::UnitX());
-    const Vec3 t = d.unitOrthogonal(), s = d.cross(t);
-    query(d);
-    for (const double angle : {0.0, 2.0943951023931953, 4.1887902047863905})
-      query(-d / 3 + 0.9428090415820634 * (std::cos(angle) * t + std::sin(angle) * s));
-    for (int k = 0; k < 3; ++k)
-      for (const double sign : {1.0, -1.0}) query(sign * Vec3::Unit(k));
-    // The tetrahedron of largest volume among the ten, greedily.
+  // The tetrahedron of largest volume among the points, greedily, and the others onto it. False where it is
+  // lower than `least` of its own size.
+  bool start_from_points(double least) {
     int pick[4] = {0, -1, -1, -1};
-    const auto g = [&](int k) -> const Vec3& { return hull_.vertex[k].g; };
+    const auto g = [&](int k) -> const Vec3& { return hull_.point(k); };
+    double size = 0, volume = 0;
     for (int want = 1; want < 4; ++want) {
       double best = 0;
-      for (int k = 0; k < hull_.vertices; ++k) {
+      for (int k = 0; k < hull_.points(); ++k) {
         const Vec3 e = g(k) - g(pick[0]);
         double measure;
         if (want == 1)
@@ -251,68 +164,65 @@ class Search {
         }
       }
       if (pick[want] < 0) return false;
+      (want == 1 ? size : volume) = best;
     }
+    if (!(volume > least * size * size * size)) return false;
     if (!hull_.start(pick[0], pick[1], pick[2], pick[3])) return false;
-    for (int k = 0; k < hull_.vertices; ++k)
-      if (k != pick[0] && k != pick[1] && k != pick[2] && k != pick[3]) hull_.grow(k, roundoff());
-    return !hull_.broken;
+    for (int k = 0; k < hull_.points(); ++k)
+      if (k != pick[0] && k != pick[1] && k != pick[2] && k != pick[3]) hull_.grow(k, least_height());
+    return true;
   }
 
-  // Round a deep minimum the hull's faces have to shrink to the root of the tolerance. Supports along rings
-  // of directions about the seed, each wider than the one inside it, leave the search little else to find.
-  void surround_seed() {
-    if (best_ != 0 || lower_ > -shrink_) return;  // the seed is not the minimum, or the cores are apart
+  // Round a deep minimum d the hull's faces have to shrink to the root of the tolerance. Points x = W (n - d)
+  // of a ring of normals n lie x . W^-1 x / 2 below d's plane; with them the hull reaches as far as d's along
+  // every direction up to w / delta times the ring's (w: least eigenvalue of W, delta: depth). Rings that far
+  // apart leave the search little else to find.
+  void surround_best() {
+    const double depth = -(lower_ + shrink_);
+    if (!(depth > 0)) return;
+    const int from = best_;
     const Vec3 d = direction_, t = d.unitOrthogonal(), s = d.cross(t);
+    Mat2 wa, wb;
+    const Witness& w = witness_[from];
+    const bool round = support_turn(*pair_.a, w.on_a, d, t, s, pair_.scale_a, &wa) &&
+                       support_turn(*pair_.b, w.on_b, pair_.direction_on_b(d), pair_.turn.transpose() * t,
+                                    pair_.turn.transpose() * s, pair_.scale_b, &wb);
+    if (!round) return;
+    Mat2 along = wa + wb - shrink_ * Mat2::Identity();
+    Mat2 axes = Mat2::Identity();
+    const double mean = 0.5 * along.trace(), half = 0.5 * (along(0, 0) - along(1, 1)),
+                 spread = std::hypot(half, along(0, 1)), least = mean - spread, most = mean + spread;
+    if (!(least > kLeastSpread * depth)) return;
+    const double angle = 0.5 * std::atan2(along(0, 1), half);
+    axes << std::cos(angle), -std::sin(angle), std::sin(angle), std::cos(angle);
+    const double ratio = std::clamp(kRingShare * least / depth, kLeastRing, kMostRing);
     double phase = 0;
-    for (double angle = std::sqrt(tolerance_ / pair_.size); angle < kWidestRing; angle *= kRingRatio) {
-      for (int k = 0; k < 3; ++k) {
-        const double turn = phase + 2 * M_PI / 3 * k;
-        const int v = query((d + angle * (std::cos(turn) * t + std::sin(turn) * s)).normalized());
-        if (v < 0 || !hull_.grow(v, 0.25 * roundoff())) return;
+    // r: root of twice the drop.
+    for (double r = std::sqrt(tolerance_); r / std::sqrt(most) < kWidestRing; r *= ratio) {
+      for (int k = 0; k < 4; ++k) {
+        const double turn = phase + 0.5 * M_PI * k;
+        const Vec2 tilt =
+            axes * Vec2(r * std::cos(turn) / std::sqrt(most), r * std::sin(turn) / std::sqrt(least));
+        if (tilt.norm() > kWidestTilted) continue;
+        const int v = query((d + tilt[0] * t + tilt[1] * s).normalized(), from);
+        if (v < 0) return;
+        hull_.grow(v, least_height());
       }
-      phase += M_PI / 3;
+      phase += M_PI / 4;
     }
   }
 
-  void run(double enough) {
-    surround_seed();
-    if (hull_.broken) return;
-    for (int step = 0; step < kHullVertices; ++step) {
-      const Vec3 d = next_direction();
-      if (upper_ - lower_ <= tolerance_ || lower_ > enough) return;
-      const int v = query(d);
-      if (v < 0) return;
-      if (upper_ - lower_ <= tolerance_) return;
-      if (!hull_.grow(v, 0.25 * roundoff())) return;
-    }
+  // Newton from the best points to the minimum they are near.
+  bool polish() {
+    const Witness& w = witness_[best_];
+    const JointSolution s = solve_joint(pair_, w.on_a, w.on_b, tolerance_, kFarAway, kPolishIterations);
+    if (!s.converged && !s.stationary) return false;
+    const int before = best_;
+    const int v = query(s.normal, best_);
+    if (v < 0) return false;
+    hull_.grow(v, least_height());
+    return best_ != before;
   }
-
-  PolytopeResult result() const {
-    PolytopeResult r;
-    r.iterations = queries_;
-    r.bracket.lower = lower_;
-    r.bracket.upper = std::max(upper_, lower_);
-    r.converged = upper_ - lower_ <= tolerance_;
-    r.bracket.direction = direction_;
-    r.points.na = direction_;
-    r.points.nb = -direction_;
-    const Vertex& v = hull_.vertex[best_];
-    Vec3 a = v.a, b = v.b;
-    find_witness(&a, &b);
-    r.points.a = a + shrink_a_ * direction_;
-    r.points.b = b - shrink_b_ * direction_;
-    r.points.on_a = {v.patch_a, v.u_a, v.v_a};
-    r.points.on_b = {v.patch_b, v.u_b, v.v_b};
-    const double apart = direction_.dot(r.points.b - r.points.a);
-    r.gap = std::clamp(apart, r.bracket.lower, r.bracket.upper);
-    // The hull lies inside the obstacle, by less than the witnesses are known sideways.
-    r.points.a += 0.5 * (apart - r.gap) * direction_;
-    r.points.b -= 0.5 * (apart - r.gap) * direction_;
-    return r;
-  }
-
- private:
-  double roundoff() const { return kRoundoff * pair_.reach + 2 * joggle_; }
 
   // In the unit cube, the same for equal points and in no relation for others.
   Vec3 scatter(const Vec3& g) const {
@@ -320,56 +230,40 @@ class Search {
     return Vec3(std::sin(x[1] + 0.7 * x[2]), std::sin(x[2] + 0.6 * x[0]), std::sin(x[0] + 0.8 * x[1]));
   }
 
-  // Direction to ask next, and the upper bound of the gap the hull proves.
-  Vec3 next_direction() {
-    int nearest = -1;
-    double least = kFarAway;
-    for (int f = 0; f < hull_.faces; ++f)
-      if (hull_.face[f].alive && hull_.face[f].offset < least) {
-        least = hull_.face[f].offset;
-        nearest = f;
-      }
-    if (nearest < 0) return direction_;
-    if (least >= 0) {  // origin inside
-      upper_ = -least - shrink_ + roundoff();
-      return hull_.face[nearest].normal;
-    }
-    double best = kFarAway;
-    Vec3 closest = Vec3::Zero(), weights = Vec3::Zero();
-    const Face* feature = nullptr;
-    for (int k = 0; k < hull_.faces; ++k) {
-      const Face& f = hull_.face[k];
-      if (!f.alive || f.offset > 0) continue;
-      const Vec3 w = nearest_on_triangle(g(f, 0), g(f, 1), g(f, 2));
-      const Vec3 x = w[0] * g(f, 0) + w[1] * g(f, 1) + w[2] * g(f, 2);
-      const double distance = x.squaredNorm();
-      // Of features as near as each other the largest: the origin's foot may be a hair inside an edge.
-      const bool larger = feature && count_positive(w) > count_positive(weights);
-      if (distance < best * (1 - kTie) || (larger && distance <= best * (1 + kTie))) {
-        best = distance;
-        closest = x;
-        weights = w;
-        feature = &f;
-      }
-    }
-    const double distance = std::sqrt(best);
-    upper_ = distance - shrink_ + roundoff();
-    const bool clear = feature && distance > roundoff();
-    return clear ? away_from(*feature, weights, closest) : hull_.face[nearest].normal;
+  // The face nearest to the origin, the direction to ask for it, and the upper bound of the gap it proves.
+  int best_face() {
+    const GrowingHull::Nearest near = hull_.nearest();
+    if (near.face < 0) return -1;
+    const GrowingHull::Face& f = hull_.face(near.face);
+    const double distance = std::sqrt(near.distance2);
+    upper_ = std::min(upper_, (near.inside ? -distance : distance) - shrink_ + roundoff());
+    const Vec3 closest = hull_.nearest_point(f);
+    const bool plane = !f.sliver && (near.inside || f.weights.minCoeff() > 0 || !(distance > roundoff()));
+    if (plane)
+      direction_to_ask_ = f.normal;
+    else if (distance > 0)
+      direction_to_ask_ = away_from(f, near.inside ? Vec3(-closest) : closest);
+    else
+      return -1;
+    return near.face;
   }
 
-  const Vec3& g(const Face& f, int k) const { return hull_.vertex[f.vertex[k]].g; }
+  int closest_of(const GrowingHull::Face& f, const Vec3& d) const {
+    int best = f.vertex[0];
+    for (const short v : f.vertex)
+      if (d.dot(witness_[v].d) > d.dot(witness_[best].d)) best = v;
+    return best;
+  }
 
   // Unit direction from the nearest point to the origin, square to the face or edge it lies in: the origin
   // may be so near that the difference alone has lost the digits that separate flat faces.
-  Vec3 away_from(const Face& f, const Vec3& w, const Vec3& closest) const {
+  Vec3 away_from(const GrowingHull::Face& f, const Vec3& closest) const {
     int on[3], count = 0;
     for (int k = 0; k < 3; ++k)
-      if (w[k] > 0) on[count++] = k;
-    if (count == 3) return f.normal;
+      if (f.weights[k] > 0) on[count++] = f.vertex[k];
     Vec3 d = -closest;
     if (count == 2) {
-      const Vec3 edge = (g(f, on[1]) - g(f, on[0])).normalized();
+      const Vec3 edge = (hull_.point(on[1]) - hull_.point(on[0])).normalized();
       d -= edge.dot(d) * edge;
     }
     return d.normalized();
@@ -381,17 +275,18 @@ class Search {
   void find_witness(Vec3* a, Vec3* b) const {
     const Vec3 target = std::min(0.0, lower_ + shrink_) * -direction_;
     double best = kFarAway;
-    for (int k = 0; k < hull_.faces; ++k) {
-      const Face& f = hull_.face[k];
+    for (int k = 0; k < hull_.faces(); ++k) {
+      const GrowingHull::Face& f = hull_.face(k);
       if (!f.alive) continue;
-      const Vec3 w = nearest_on_triangle(g(f, 0) - target, g(f, 1) - target, g(f, 2) - target);
-      const double distance = (w[0] * g(f, 0) + w[1] * g(f, 1) + w[2] * g(f, 2) - target).squaredNorm();
+      const Vec3 &p = hull_.point(f.vertex[0]), &q = hull_.point(f.vertex[1]), &r = hull_.point(f.vertex[2]);
+      const Vec3 w = nearest_on_triangle(p - target, q - target, r - target);
+      const double distance = (w[0] * p + w[1] * q + w[2] * r - target).squaredNorm();
       if (!(distance < best)) continue;
       best = distance;
       *a = *b = Vec3::Zero();
       for (int i = 0; i < 3; ++i) {
-        *a += w[i] * hull_.vertex[f.vertex[i]].a;
-        *b += w[i] * hull_.vertex[f.vertex[i]].b;
+        *a += w[i] * witness_[f.vertex[i]].a;
+        *b += w[i] * witness_[f.vertex[i]].b;
       }
     }
   }
@@ -400,9 +295,10 @@ class Search {
   double tolerance_, joggle_;
   double shrink_a_, shrink_b_, shrink_;
   double lower_ = -kFarAway, upper_ = kFarAway;
-  Vec3 direction_ = Vec3::UnitX();
+  Vec3 direction_ = Vec3::UnitX(), direction_to_ask_ = Vec3::UnitX();
   int best_ = 0, queries_ = 0;
-  Hull hull_;
+  Witness witness_[kHullVertices];
+  GrowingHull hull_;
 };
 
 }  // namespace

@@ -108,25 +108,31 @@ constexpr double kJointCapSafety = 1.5;    // on the angle between the sides of 
 
 // --- support mapping
 constexpr int kSupportIterations = 60;  // 3 to 5 are usual; hops between patches count too
-constexpr int kPolarRestarts = 4;       // times a search may leave a pole
 constexpr double kSlopeTolerance =
     1e-14;  // d . tangent below this is a maximum: excess P slope^2 is far below round-off
 constexpr double kSameSupport = 1e-6;       // points closer than this are one local maximum
 constexpr double kStepTolerance = 1e-13;    // a step shorter than this is round-off
 constexpr double kSufficientAscent = 1e-4;  // share of the gain a step's slope promises that it must bring
 constexpr double kOnEdge = 1e-12;           // a parameter this near 0 or 1 is on the patch's edge
-constexpr double kPoleMetric = 1e-26;  // |S_u|^2 this much smaller than |S_v|^2: at a pole, up to round-off
-constexpr double kPoleOffset =
-    1e-7;  // nearer to a pole than this (relative speed of the parameters) normals are lost
-constexpr double kPoleNormal =
-    1e-8;  // the same where the limit of the normal is at hand, which errs by as much
+constexpr double kPoleMetric = 1e-26;   // |S_u|^2 this much smaller than |S_v|^2: at a pole, up to round-off
+constexpr double kPoleNormal = 1e-8;    // nearer to a pole than this (relative speed of the parameters) its
+                                        // normal is taken from the limit, which errs by as much
+constexpr double kPoleSpeed = 1e-6;     // root of |Su x Sv| over the bounding radius, and ...
+constexpr double kLeastSine = 1e-4;     // ... sine between the tangents, below which a normal is no proof
+constexpr double kNormalNoise = 4e-16;  // round-off of a normal whose tangents are at right angles
 constexpr double kFlatCurvature = 1e-12;   // over the bounding radius: a curvature below this says nothing
                                            // about how far to step
 constexpr double kSingularMetric = 1e-24;  // square of the sine of the angle between the tangents, below
                                            // which only one of them is used
-constexpr double kSamePole = 1e-9;         // collapsed edges closer than this are one pole
-constexpr double kPoleRestart = 0.25;      // parameters from the pole at which a search is taken up, at most
 constexpr int kStepHalvings = 40;          // of a step that does not ascend: 1e-12 of it is left
+
+// --- highest point of a patch
+constexpr int kMaximumBoxes = 2000;    // of one patch; 3 to 30 are usual
+constexpr int kMaximumDepth = 80;      // halvings: both parameters to round-off
+constexpr double kConcaveShare = 0.1;  // of the second derivatives that the mixed one must leave
+constexpr int kConcaveSteps = 8;       // of Newton in a concave box
+constexpr double kConcaveRest = 1e-6;  // of the slack: what the gradient left may hide
+constexpr double kSupportSlack = 2;    // round-offs of a body that its support may lack
 
 // --- certificate
 constexpr double kLeastTolerance =
@@ -156,14 +162,22 @@ constexpr double kForceDepth = 1e-3;       // of the smaller radius: overlaps ar
 constexpr double kLocalDrift = 20;         // of the tolerance that the contact points may be off
 
 // --- polytope method
-constexpr int kHullVertices = 512;   // support pairs a fallback may spend; 20 to 80 are usual
-constexpr int kHullFaces = 2048;     // twice the vertices, and room for those being replaced
-constexpr int kHullAttempts = 5;     // from other directions, when round-off broke the hull
-constexpr double kHullTurn = 0.2;    // between them
-constexpr double kCoreShare = 0.5;   // of the smaller of the bodies' least curvature radii taken off, the
-                                     // other wholly: more would leave two spheres no volume
-constexpr double kRingRatio = 4;     // between the rings of directions about a deep minimum
-constexpr double kWidestRing = 0.5;  // rad
+constexpr int kHullVertices = 512;      // support pairs a fallback may spend; 20 to 80 are usual
+constexpr int kHullFaces = 2048;        // twice the vertices, and room for those being replaced
+constexpr int kHullAttempts = 3;        // from other directions, when round-off stalled the hull
+constexpr double kHullTurn = 0.2;       // between them
+constexpr double kCoreShare = 0.5;      // of the smaller of the bodies' least curvature radii taken off, the
+                                        // other wholly: more would leave two spheres no volume
+constexpr double kFlatStart = 1e-3;     // volume of a first tetrahedron over its longest edge cubed, at least
+constexpr double kLeastHeight = 0.02;   // of the tolerance: a point less high above a face is not added
+constexpr double kSupportShare = 0.02;  // of the tolerance that a support may lack
+constexpr int kPolishAfter = 3;  // queries after which another minimum than the seed's is gone straight to
+constexpr int kMostPolishes = 6;
+constexpr double kRingShare = 1.6;  // of w / depth between the rings of directions about a deep minimum ...
+constexpr double kLeastRing = 2, kMostRing = 16;  // ... with these limits
+constexpr double kLeastSpread = 1e-3;             // of the depth: the least w worth rings
+constexpr double kWidestRing = 0.7;               // rad, along the direction of larger w ...
+constexpr double kWidestTilted = 1.2;             // ... and in any
 constexpr double kSliver = 1e-13;  // triangles of the hull lower than this, relative to the larger body, have
                                    // no normal of their own
 constexpr double kJoggle = 1e-11;  // the second hull's vertices move by this, relative to the larger body

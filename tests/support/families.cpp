@@ -13,6 +13,7 @@
 #include "shapes/primitives.h"
 #include "support/ellipsoid_oracle.h"
 #include "support/pairs.h"
+#include "support/solid_families.h"
 
 namespace nurbs::families {
 
@@ -710,7 +711,7 @@ PairCase rounded_digits(Random& random, long) {
 
 const std::vector<Family>& all_families() {
   constexpr long kMany = 100000, kSearched = 5000;
-  static const std::vector<Family> all = {
+  static const std::vector<Family> ovals = {
       {"slender", "slender ellipsoids .05/.07/.15, gaps 1e-9..1e-2 of the size, both signs", kMany, slender},
       {"tiny gap", "gaps 1e-12..1e-7 of the size, both signs, tolerance 1e-13", kMany, tiny_gap},
       {"size ratio", "sizes up to 1000 : 1", kMany, size_ratio},
@@ -740,6 +741,11 @@ const std::vector<Family>& all_families() {
       {"mismatched joints", "patches each with parameters of its own", kMany, mismatched_joints},
       {"rounded digits", "control points of 6 to 12 decimals: joints gape", kSearched, rounded_digits},
   };
+  static const std::vector<Family> all = [] {
+    std::vector<Family> joined = ovals;
+    joined.insert(joined.end(), solid_families().begin(), solid_families().end());
+    return joined;
+  }();
   return all;
 }
 
@@ -770,7 +776,10 @@ Verdict judge(const PairCase& c, const Answer& r, double mesh_error) {
   if (!std::isfinite(r.gap) || (r.has_normal && !r.normal.allFinite())) return fail(Failure::not_a_number);
   if (r.unresolved) return fail(Failure::unresolved);
   // Any normal shows that the gap is at least -p(normal); a searched truth may be no better.
-  const double along = r.has_normal ? -test::overlap_along(c.a, c.b, r.normal.normalized()) : -kFarAway;
+  const auto overlap = [&c](const Vec3& d) {
+    return c.overlap ? c.overlap(d) : test::overlap_along(c.a, c.b, d);
+  };
+  const double along = r.has_normal ? -overlap(r.normal.normalized()) : -kFarAway;
   const double truth = c.truth.known == Known::bound ? std::max(c.truth.gap, along) : c.truth.gap;
   v.error = std::abs(r.gap - truth);
   if (r.gap * truth < 0 && std::min(std::abs(r.gap), std::abs(truth)) > v.allowed) return fail(Failure::sign);

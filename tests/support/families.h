@@ -34,6 +34,8 @@ struct PairCase {
   bool warm = false;  // the pair is remembered from quite another pose
   Particle a_before, b_before;
   Truth truth;
+  std::function<double(const Vec3&)>
+      overlap;  // p(d) in closed form, d in the lab; unset: with the supports of src/
 };
 
 struct Family {

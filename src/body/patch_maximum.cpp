@@ -1,0 +1,327 @@
+// Branch and bound on d . s(u, v) over one patch; see patch_maximum.h.
+#include "body/patch_maximum.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "nurbs/tolerances.h"
+
+namespace nurbs {
+namespace {
+
+constexpr int kMost = (kMaxDegree + 1) * (kMaxDegree + 1);
+
+// A piece [u0, u1] x [v0, v1] of the patch with the coefficients of d . wx - h0 w and of w on it. A degree of
+// 0 means that the piece is an edge.
+struct Box {
+  int nu, nv;
+  bool rational;
+  double u0, u1, v0, v1;
+  double f[kMost], w[kMost];
+
+  int size() const { return (nu + 1) * (nv + 1); }
+  double weight(int k) const { return rational ? w[k] : 1.0; }
+  void set_header(const Box& other) {
+    nu = other.nu;
+    nv = other.nv;
+    rational = other.rational;
+    u0 = other.u0;
+    u1 = other.u1;
+    v0 = other.v0;
+    v1 = other.v1;
+  }
+};
+
+void copy(const Box& from, Box* to) {
+  to->set_header(from);
+  std::copy_n(from.f, from.size(), to->f);
+  if (from.rational) std::copy_n(from.w, from.size(), to->w);
+}
+
+// De Casteljau at the middle of one line of coefficients.
+void halve_line(const double* in, int degree, int stride, double* low, double* high) {
+  double a[kMaxDegree + 1];
+  for (int i = 0; i <= degree; ++i) a[i] = in[i * stride];
+  for (int k = 0; k <= degree; ++k) {
+    low[k * stride] = a[0];
+    high[(degree - k) * stride] = a[degree - k];
+    for (int i = 0; i < degree - k; ++i) a[i] = 0.5 * (a[i] + a[i + 1]);
+  }
+}
+
+void halve(const Box& box, bool along_u, Box* low, Box* high) {
+  low->set_header(box);
+  high->set_header(box);
+  if (along_u)
+    low->u1 = high->u0 = 0.5 * (box.u0 + box.u1);
+  else
+    low->v1 = high->v0 = 0.5 * (box.v0 + box.v1);
+  const int row = box.nv + 1;
+  const int lines = along_u ? row : box.nu + 1, degree = along_u ? box.nu : box.nv;
+  const int stride = along_u ? row : 1, next = along_u ? 1 : row;
+  for (int k = 0; k < lines; ++k) {
+    halve_line(box.f + k * next, degree, stride, low->f + k * next, high->f + k * next);
+    if (box.rational) halve_line(box.w + k * next, degree, stride, low->w + k * next, high->w + k * next);
+  }
+}
+
+// Keeps one edge of the box: `high` u (or v) only.
+void keep_edge(bool along_u, bool high, Box* box) {
+  const int row = box->nv + 1;
+  if (along_u) {
+    const int from = high ? box->nu * row : 0;
+    for (int j = 0; j < row; ++j) {
+      box->f[j] = box->f[from + j];
+      if (box->rational) box->w[j] = box->w[from + j];
+    }
+    box->nu = 0;
+    (high ? box->u0 : box->u1) = high ? box->u1 : box->u0;
+  } else {
+    const int from = high ? box->nv : 0;
+    for (int i = 0; i <= box->nu; ++i) {
+      box->f[i] = box->f[i * row + from];
+      if (box->rational) box->w[i] = box->w[i * row + from];
+    }
+    box->nv = 0;
+    (high ? box->v0 : box->v1) = high ? box->v1 : box->v0;
+  }
+}
+
+// Value and two derivatives at t of one line of coefficients.
+void evaluate_line(const double* c, int degree, int stride, double t, double (&out)[3]) {
+  double a[kMaxDegree + 1];
+  for (int i = 0; i <= degree; ++i) a[i] = c[i * stride];
+  const double s = 1 - t;
+  out[1] = out[2] = 0;
+  for (int left = degree; left > 0; --left) {
+    if (left == 2) out[2] = degree * (degree - 1) * (a[2] - 2 * a[1] + a[0]);
+    if (left == 1) out[1] = degree * (a[1] - a[0]);
+    for (int i = 0; i < left; ++i) a[i] = s * a[i] + t * a[i + 1];
+  }
+  out[0] = a[0];
+}
+
+struct Taylor {
+  double f, fu, fv, fuu, fuv, fvv;
+};
+Taylor evaluate_net(const double* c, int nu, int nv, double s, double t) {
+  double line[3][kMaxDegree + 1];
+  for (int i = 0; i <= nu; ++i) {
+    double out[3];
+    evaluate_line(c + i * (nv + 1), nv, 1, t, out);
+    for (int k = 0; k < 3; ++k) line[k][i] = out[k];
+  }
+  double a[3], b[3], d[3];
+  evaluate_line(line[0], nu, 1, s, a);
+  evaluate_line(line[1], nu, 1, s, b);
+  evaluate_line(line[2], nu, 1, s, d);
+  return {a[0], a[1], b[0], a[2], b[1], d[0]};
+}
+
+struct Range {
+  double low = kFarAway, high = -kFarAway;
+  void add(double x) {
+    low = std::min(low, x);
+    high = std::max(high, x);
+  }
+  double magnitude() const { return std::max(std::abs(low), std::abs(high)); }
+};
+
+// What the coefficients of the box's f - level w say of it.
+struct Bounds {
+  Range g, gu, gv, guu, guv, gvv;  // first and second differences, not times the degrees
+};
+void difference(const double* g, int nu, int nv, Bounds* b) {
+  const int row = nv + 1;
+  for (int i = 0; i <= nu; ++i)
+    for (int j = 0; j <= nv; ++j) {
+      const double* c = g + i * row + j;
+      if (i < nu) b->gu.add(c[row] - c[0]);
+      if (j < nv) b->gv.add(c[1] - c[0]);
+      if (i < nu && j < nv) b->guv.add(c[row + 1] - c[row] - c[1] + c[0]);
+      if (i + 1 < nu) b->guu.add(c[2 * row] - 2 * c[row] + c[0]);
+      if (j + 1 < nv) b->gvv.add(c[2] - 2 * c[1] + c[0]);
+    }
+}
+
+class Search {
+ public:
+  Search(const BezierPatch& patch, int index, const Vec3& d, double slack, Highest* best)
+      : patch_(patch), index_(index), d_(d), slack_(slack), h0_(best->h), best_(best) {}
+
+  void run() {
+    Box& root = stack_[0];
+    root.nu = patch_.degree_u;
+    root.nv = patch_.degree_v;
+    root.rational = patch_.rational;
+    root.u0 = root.v0 = 0;
+    root.u1 = root.v1 = 1;
+    for (int k = 0; k < root.size(); ++k) {
+      const Vec4& p = patch_.points[k];
+      root.f[k] = d_.dot(p.head<3>()) - h0_ * p[3];
+      if (root.rational) root.w[k] = p[3];
+    }
+    double over = 0;  // of boxes given up, above h0
+    int top = 1;
+    for (int boxes = 0; top > 0; ++boxes) {
+      Box& box = stack_[top - 1];
+      ++best_->boxes;
+      const Next next = look_at(box);
+      if (next == Next::done) {
+        --top;
+        continue;
+      }
+      if (boxes >= kMaximumBoxes || top + 1 > kMaximumDepth) {
+        over = std::max(over, highest_coefficient(box));
+        --top;
+        continue;
+      }
+      Box& low = stack_[top];
+      if (next == Next::edges) {
+        copy(box, &low);
+        keep_edge(edges_along_u_, false, &low);
+        keep_edge(edges_along_u_, true, &box);
+      } else {
+        Box& high = stack_[top + 1];
+        halve(box, next == Next::halve_u, &low, &high);
+        if (highest_coefficient(low) >= highest_coefficient(high)) {
+          copy(high, &box);
+        } else {
+          copy(low, &box);
+          copy(high, &low);
+        }
+      }
+      ++top;
+    }
+    best_->upper = std::max({best_->upper, best_->h + slack_, h0_ + over});
+  }
+
+ private:
+  enum class Next { done, edges, halve_u, halve_v };
+
+  static double highest_coefficient(const Box& box) {
+    double most = -kFarAway;
+    for (int k = 0; k < box.size(); ++k) most = std::max(most, box.f[k] / box.weight(k));
+    return most;
+  }
+
+  void offer(double u, double v, double height) {
+    if (!(h0_ + height > best_->h)) return;
+    best_->h = h0_ + height;
+    best_->where = {index_, u, v};
+  }
+  void offer_corner(const Box& box, bool high_u, bool high_v) {
+    const int k = (high_u ? box.nu * (box.nv + 1) : 0) + (high_v ? box.nv : 0);
+    offer(high_u ? box.u1 : box.u0, high_v ? box.v1 : box.v0, box.f[k] / box.weight(k));
+  }
+
+  // Coefficients of f - level w; whether any is positive.
+  bool lower(const Box& box, double* g) {
+    const double level = level_ = best_->h - h0_ + slack_;
+    double most = -kFarAway;
+    const int n = box.size();
+    if (box.rational)
+      for (int k = 0; k < n; ++k) g[k] = box.f[k] - level * box.w[k], most = std::max(most, g[k]);
+    else
+      for (int k = 0; k < n; ++k) g[k] = box.f[k] - level, most = std::max(most, g[k]);
+    return most > 0;
+  }
+
+  Next look_at(Box& box) {
+    double g[kMost];
+    for (;;) {
+      if (!lower(box, g)) return Next::done;
+      const double before = best_->h;
+      offer_corner(box, false, false);
+      if (box.nu > 0) offer_corner(box, true, false);
+      if (box.nv > 0) offer_corner(box, false, true);
+      if (box.nu > 0 && box.nv > 0) offer_corner(box, true, true);
+      if (box.nu == 0 && box.nv == 0) return Next::done;
+      if (best_->h > before && !lower(box, g)) return Next::done;
+      Bounds b;
+      difference(g, box.nu, box.nv, &b);
+      const bool one_u = box.nu > 0 && (b.gu.high <= 0 || b.gu.low >= 0);
+      const bool one_v = box.nv > 0 && (b.gv.high <= 0 || b.gv.low >= 0);
+      if (one_u || one_v) {
+        if (one_u) keep_edge(true, b.gu.high > 0, &box);
+        if (one_v) keep_edge(false, b.gv.high > 0, &box);
+        continue;
+      }
+      if (box.nu == 1 || box.nv == 1) {
+        edges_along_u_ = box.nu == 1;
+        return Next::edges;
+      }
+      const double top = best_->h;
+      if (concave(box, g, b)) return Next::done;
+      if (best_->h > top) continue;
+      if (box.nu == 0) return Next::halve_v;
+      if (box.nv == 0) return Next::halve_u;
+      const double bend_u = box.nu * (box.nu - 1) * b.guu.magnitude(),
+                   bend_v = box.nv * (box.nv - 1) * b.gvv.magnitude();
+      return bend_u > bend_v ? Next::halve_u : Next::halve_v;
+    }
+  }
+
+  // Whether g is concave on the box and, from the gradient at its maximum there, proven not to be positive.
+  // May instead raise best, which lowers g.
+  bool concave(const Box& box, const double* g, const Bounds& b) {
+    const bool u = box.nu > 0, v = box.nv > 0;
+    const double a = u ? -box.nu * (box.nu - 1) * b.guu.high : 1,
+                 c = v ? -box.nv * (box.nv - 1) * b.gvv.high : 1;
+    if (!(a > 0 && c > 0)) return false;
+    double share = 1;  // of the diagonal that the mixed term leaves
+    if (u && v) share -= box.nu * box.nv * b.guv.magnitude() / std::sqrt(a * c);
+    if (!(share > kConcaveShare)) return false;
+    const double width_u = box.u1 - box.u0, width_v = box.v1 - box.v0;
+    double s = 0.5, t = 0.5;
+    const SurfacePoint& at = best_->where;
+    if (at.patch == index_ && at.u >= box.u0 && at.u <= box.u1 && at.v >= box.v0 && at.v <= box.v1) {
+      if (u) s = (at.u - box.u0) / width_u;
+      if (v) t = (at.v - box.v0) / width_v;
+    }
+    for (int k = 0;; ++k) {
+      const Taylor x = evaluate_net(g, box.nu, box.nv, s, t);
+      // What the bounds hold back is no slope.
+      const bool at_u = !u || (s <= 0 && x.fu < 0) || (s >= 1 && x.fu > 0);
+      const bool at_v = !v || (t <= 0 && x.fv < 0) || (t >= 1 && x.fv > 0);
+      const double gu = at_u ? 0 : x.fu, gv = at_v ? 0 : x.fv;
+      const double rest = 0.5 * (gu * gu / a + gv * gv / c) / share;
+      const double weight = box.rational ? evaluate_net(box.w, box.nu, box.nv, s, t).f : 1;
+      double s_next = s, t_next = t;
+      const double det = x.fuu * x.fvv - x.fuv * x.fuv;
+      if (at_v && !at_u) s_next = s - x.fu / x.fuu;
+      if (at_u && !at_v) t_next = t - x.fv / x.fvv;
+      if (!at_u && !at_v) {
+        s_next = s + (-x.fvv * x.fu + x.fuv * x.fv) / det;
+        t_next = t + (x.fuv * x.fu - x.fuu * x.fv) / det;
+      }
+      s_next = std::clamp(s_next, 0.0, 1.0);
+      t_next = std::clamp(t_next, 0.0, 1.0);
+      const bool still = !(s_next != s || t_next != t);
+      if (rest <= kConcaveRest * slack_ * weight || still || k == kConcaveSteps) {
+        const double before = best_->h;
+        offer(box.u0 + s * width_u, box.v0 + t * width_v, level_ + x.f / weight);
+        return !(best_->h > before) && x.f + rest <= 0;
+      }
+      s = s_next;
+      t = t_next;
+    }
+  }
+
+  const BezierPatch& patch_;
+  const int index_;
+  const Vec3& d_;
+  const double slack_, h0_;
+  Highest* best_;
+  double level_ = 0;  // of the coefficients last taken
+  bool edges_along_u_ = false;
+  Box stack_[kMaximumDepth + 2];  // left uninitialised
+};
+
+}  // namespace
+
+void raise(const BezierPatch& patch, int index, const Vec3& d, double slack, Highest* best) {
+  Search(patch, index, d, slack, best).run();
+}
+
+}  // namespace nurbs

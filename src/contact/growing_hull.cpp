@@ -1,0 +1,223 @@
+// Horizon by flood fill from the highest face, checked to be one closed loop before anything is changed.
+#include "contact/growing_hull.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+namespace nurbs {
+namespace {
+
+int count_positive(const Vec3& w) {
+  return (w[0] > 0) + (w[1] > 0) + (w[2] > 0);
+}
+
+}  // namespace
+
+Vec3 nearest_on_triangle(const Vec3& a, const Vec3& b, const Vec3& c) {
+  const Vec3 ab = b - a, ac = c - a;
+  const double d1 = -ab.dot(a), d2 = -ac.dot(a);
+  if (d1 <= 0 && d2 <= 0) return {1, 0, 0};
+  const double d3 = -ab.dot(b), d4 = -ac.dot(b);
+  if (d3 >= 0 && d4 <= d3) return {0, 1, 0};
+  const double vc = d1 * d4 - d3 * d2;
+  if (vc <= 0 && d1 >= 0 && d3 <= 0) {
+    const double t = d1 / (d1 - d3);
+    return {1 - t, t, 0};
+  }
+  const double d5 = -ab.dot(c), d6 = -ac.dot(c);
+  if (d6 >= 0 && d5 <= d6) return {0, 0, 1};
+  const double vb = d5 * d2 - d1 * d6;
+  if (vb <= 0 && d2 >= 0 && d6 <= 0) {
+    const double t = d2 / (d2 - d6);
+    return {1 - t, 0, t};
+  }
+  const double va = d3 * d6 - d5 * d4;
+  if (va <= 0 && d4 - d3 >= 0 && d5 - d6 >= 0) {
+    const double t = (d4 - d3) / ((d4 - d3) + (d5 - d6));
+    return {0, 1 - t, t};
+  }
+  const double sum = va + vb + vc;
+  if (!(sum > 0)) return {1, 0, 0};
+  return {va / sum, vb / sum, vc / sum};
+}
+
+int GrowingHull::store(const Vec3& point) {
+  if (points_ == kHullVertices) return -1;
+  point_[points_] = point;
+  edge_from_[points_] = -1;
+  return points_++;
+}
+
+void GrowingHull::set(int f, int a, int b, int c) {
+  Face& face = face_[f];
+  face.vertex = {static_cast<short>(a), static_cast<short>(b), static_cast<short>(c)};
+  face.alive = true;
+  marked_[f] = false;
+  const Vec3 &p = point_[a], &q = point_[b], &r = point_[c];
+  const Vec3 m = (q - p).cross(r - p);
+  const double area2 = m.squaredNorm();
+  const double base2 = std::max({(q - p).squaredNorm(), (r - q).squaredNorm(), (p - r).squaredNorm()});
+  face.sliver = !(area2 > sliver_ * sliver_ * base2);
+  face.normal = face.sliver ? Vec3(Vec3::Zero()) : Vec3(m / std::sqrt(area2));
+  face.offset = std::min({face.normal.dot(p), face.normal.dot(q), face.normal.dot(r)});
+  // With the plane's own foot where it lies inside, which is exact to round-off however far the corners are.
+  face.weights = nearest_on_triangle(p, q, r);
+  face.distance2 = count_positive(face.weights) == 3 && !face.sliver ? face.offset * face.offset
+                                                                     : nearest_point(face).squaredNorm();
+}
+
+bool GrowingHull::start(int a, int b, int c, int d) {
+  const Vec3 &p = point_[a], &q = point_[b], &r = point_[c], &s = point_[d];
+  const double volume = (q - p).cross(r - p).dot(s - p);
+  faces_ = free_ = 0;
+  if (volume == 0 || !std::isfinite(volume)) return false;
+  if (volume > 0) std::swap(b, c);
+  set(0, a, b, c);
+  set(1, b, a, d);
+  set(2, c, b, d);
+  set(3, a, c, d);
+  face_[0].across = {1, 2, 3};
+  face_[1].across = {0, 3, 2};
+  face_[2].across = {0, 1, 3};
+  face_[3].across = {0, 2, 1};
+  faces_ = 4;
+  return true;
+}
+
+int GrowingHull::highest_seen_from(const Vec3& p, double* height) const {
+  int best = -1;
+  for (int f = 0; f < faces_; ++f) {
+    if (!face_[f].alive || face_[f].sliver) continue;
+    const double h = face_[f].normal.dot(p) - face_[f].offset;
+    if (h > *height) {
+      *height = h;
+      best = f;
+    }
+  }
+  return best;
+}
+
+bool GrowingHull::find_visible(const Vec3& p, int first, double threshold) {
+  for (int k = 0; k < visible_; ++k) marked_[seen_[k]] = false;
+  visible_ = edges_ = 0;
+  seen_[visible_++] = static_cast<short>(first);
+  marked_[first] = true;
+  for (int k = 0; k < visible_; ++k)
+    for (const short n : face_[seen_[k]].across) {
+      if (marked_[n]) continue;
+      const Face& f = face_[n];
+      if (!f.sliver && !(f.normal.dot(p) - f.offset > threshold)) continue;
+      marked_[n] = true;
+      seen_[visible_++] = n;
+    }
+  for (int k = 0; k < visible_; ++k) {
+    const Face& f = face_[seen_[k]];
+    for (int e = 0; e < 3; ++e) {
+      const short n = f.across[e];
+      if (marked_[n]) continue;
+      const short from = f.vertex[e], to = f.vertex[(e + 1) % 3];
+      short slot = 0;
+      while (slot < 3 && !(face_[n].vertex[slot] == to && face_[n].vertex[(slot + 1) % 3] == from)) ++slot;
+      if (slot == 3) return false;
+      edge_[edges_++] = {from, to, n, slot};
+    }
+  }
+  return chain_horizon();
+}
+
+// Puts the horizon's edges in order round it; false unless they are one loop that meets no vertex twice.
+bool GrowingHull::chain_horizon() {
+  bool simple = edges_ >= 3;
+  for (int k = 0; k < edges_; ++k) {
+    if (edge_from_[edge_[k].from] >= 0) simple = false;
+    edge_from_[edge_[k].from] = static_cast<short>(k);
+  }
+  for (int k = 0; simple && k + 1 < edges_; ++k) {
+    const int next = edge_from_[edge_[k].to];
+    if (next <= k) {
+      simple = false;
+      break;
+    }
+    std::swap(edge_[k + 1], edge_[next]);
+    edge_from_[edge_[next].from] = static_cast<short>(next);
+    edge_from_[edge_[k + 1].from] = static_cast<short>(k + 1);
+  }
+  if (simple) simple = edge_[edges_ - 1].to == edge_[0].from;
+  for (int k = 0; k < edges_; ++k) edge_from_[edge_[k].from] = -1;
+  return simple;
+}
+
+bool GrowingHull::fan(int point) {
+  if (faces_ + std::max(0, edges_ - visible_ - free_) > kHullFaces) return false;
+  for (int k = 0; k < visible_; ++k) {
+    face_[seen_[k]].alive = false;
+    marked_[seen_[k]] = false;
+    free_list_[free_++] = seen_[k];
+  }
+  visible_ = 0;
+  short first = -1, previous = -1;
+  for (int k = 0; k < edges_; ++k) {
+    const Edge& e = edge_[k];
+    const short f = free_ > 0 ? free_list_[--free_] : static_cast<short>(faces_++);
+    set(f, e.from, e.to, point);
+    face_[f].across = {e.outside, -1, previous};
+    face_[e.outside].across[e.slot] = f;
+    if (previous >= 0) face_[previous].across[1] = f;
+    if (first < 0) first = f;
+    previous = f;
+  }
+  face_[previous].across[1] = first;
+  face_[first].across[2] = previous;
+  return true;
+}
+
+GrowingHull::Growth GrowingHull::grow(int point, double eps) {
+  const Vec3& p = point_[point];
+  double height = eps;
+  const int first = highest_seen_from(p, &height);
+  if (first < 0) return Growth::inside;
+  // A face that the point is level with, up to round-off, may count either way; one of them makes a disc.
+  const double level = std::min(eps, 0.5 * height);
+  for (const double threshold : {0.0, level, -level}) {
+    if (!find_visible(p, first, threshold)) continue;
+    return fan(point) ? Growth::grown : Growth::full;
+  }
+  return Growth::broken;
+}
+
+GrowingHull::Nearest GrowingHull::nearest() const {
+  Nearest best{-1, kFarAway, true};
+  int corners = 0;
+  for (int k = 0; k < faces_; ++k) {
+    const Face& f = face_[k];
+    if (!f.alive) continue;
+    if (!f.sliver && f.offset < 0) best.inside = false;
+    if (f.distance2 > best.distance2 * (1 + kTie)) continue;
+    const int on = count_positive(f.weights);
+    if (f.distance2 < best.distance2 * (1 - kTie) || on > corners) {
+      best.face = k;
+      best.distance2 = f.distance2;
+      corners = on;
+    }
+  }
+  return best;
+}
+
+bool GrowingHull::closed() const {
+  for (int k = 0; k < faces_; ++k) {
+    if (!face_[k].alive) continue;
+    for (int e = 0; e < 3; ++e) {
+      const short n = face_[k].across[e];
+      if (n < 0 || n >= faces_ || !face_[n].alive) return false;
+      int found = 0;
+      for (int s = 0; s < 3; ++s)
+        found += face_[n].across[s] == k && face_[n].vertex[s] == face_[k].vertex[(e + 1) % 3] &&
+                 face_[n].vertex[(s + 1) % 3] == face_[k].vertex[e];
+      if (found != 1) return false;
+    }
+  }
+  return faces_ > 0;
+}
+
+}  // namespace nurbs

@@ -1,0 +1,191 @@
+// Poses and truths; see solid_families.h. Apart, two support points that face each other are the answer;
+// overlapping, the least overlap is searched with the closed forms.
+#include "support/solid_families.h"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+
+namespace nurbs::families {
+
+using test::Solid;
+
+namespace {
+
+constexpr int kBodies = 12;
+
+Solid make_solid(Kind kind, Random& random, int k) {
+  const double weights = k % 3 == 2 ? 1e3 : 1;
+  switch (kind) {
+    case Kind::cone:
+      return k % 2 ? test::double_cone(random, random.uniform(0.3, 1.5), random.uniform(0.1, 1.5),
+                                       random.uniform(0.1, 1.5), weights)
+                   : test::cone(random, random.uniform(0.3, 1.5), random.uniform(0.3, 2), weights);
+    case Kind::cylinder:
+      return k % 2 ? test::frustum(random, random.uniform(0.2, 1.2), random.uniform(0.2, 1.2),
+                                   random.uniform(0.1, 1.5), weights)
+                   : test::cylinder(random, random.uniform(0.1, 1.2), random.uniform(0.05, 1), weights);
+    case Kind::capsule:
+      return test::capsule(random, random.uniform(0.1, 1), random.uniform(0.1, 1));
+    case Kind::lens:
+      return test::lens(random, random.log_uniform(1.02, 30));
+    default:
+      return test::polyhedron(random, 4 + k, k % 4 == 3 ? 0.05 : random.uniform(0.3, 1));
+  }
+}
+
+const Solid& unit_ball() {
+  static const Solid ball = test::ellipsoid_solid(Vec3(1, 1, 1));
+  return ball;
+}
+
+const Solid& any_of(Kind kind, Random& random) {
+  return solids_of(kind)[random.below(kBodies)];
+}
+
+// A partner for a body of `kind`: of its own kind, any other kind, or a ball.
+const Solid& partner(Kind kind, Random& random) {
+  const int which = random.below(4);
+  if (which == 0) return unit_ball();
+  return any_of(which == 1 ? static_cast<Kind>(random.below(kKinds)) : kind, random);
+}
+
+Vec3 support_of(const Solid& solid, const Particle& p, const Vec3& d) {
+  return p.scale * (p.q * solid.support(p.q.conjugate() * d));
+}
+
+// Directions that matter: any, of a face, along the support of a vertex, and next to those.
+Vec3 some_direction(const Solid& solid, Random& random) {
+  Vec3 d = random.direction();
+  if (!solid.normals.empty() && random.below(3) == 0)
+    d = solid.normals[random.below(static_cast<int>(solid.normals.size()))];
+  else if (random.below(4) == 0)
+    d = solid.support(d).normalized();
+  if (random.below(2)) d = (d + random.log_uniform(1e-12, 0.1) * random.direction()).normalized();
+  return d;
+}
+
+// Least overlap: a scan, directions of faces, and a compass that turns at random from the best.
+Truth search_least(const PairCase& c, const Solid& a, const Solid& b, Random& random) {
+  struct Start {
+    double p;
+    Vec3 d;
+  };
+  std::vector<Start> starts;
+  const auto offer = [&](const Vec3& d) { starts.push_back({c.overlap(d), d}); };
+  for (int i = 0; i < 2000; ++i) {
+    const double z = 1 - (2 * i + 1) / 2000.0, r = std::sqrt(1 - z * z), angle = 2.399963229728653 * i;
+    offer(Vec3(r * std::cos(angle), r * std::sin(angle), z));
+  }
+  for (const Vec3& n : a.normals) offer(c.a.q * n);
+  for (const Vec3& n : b.normals) offer(c.b.q * -n);
+  std::sort(starts.begin(), starts.end(), [](const Start& x, const Start& y) { return x.p < y.p; });
+  std::vector<Start> minima;
+  for (const Start& s : starts) {
+    if (minima.size() == 8) break;
+    const auto same = [&](const Start& m) { return m.d.dot(s.d) > 0.99; };
+    if (std::none_of(minima.begin(), minima.end(), same)) minima.push_back(s);
+  }
+  Truth truth;
+  truth.known = Known::bound;
+  double least = 1e300;
+  for (Start m : minima) {
+    for (double stride = 0.05; stride > 1e-12;) {
+      const Vec3 t = m.d.cross(random.direction()).normalized(), s = m.d.cross(t);
+      Start next = m;
+      for (const Vec3& step : {t, Vec3(-t), s, Vec3(-s)}) {
+        const Vec3 d = (m.d + stride * step).normalized();
+        const double p = c.overlap(d);
+        if (p < next.p) next = {p, d};
+      }
+      stride *= next.p < m.p ? 1.5 : 0.7;
+      m = next;
+    }
+    least = std::min(least, m.p);
+  }
+  truth.gap = -least;
+  return truth;
+}
+
+// Supports along a direction, `gap` apart along it; overlapping ones are searched.
+PairCase place(Random& random, const Solid& a, const Solid& b, double scale, double least, double most) {
+  PairCase c;
+  c.a = {a.shape.get(), 1, Vec3::Zero(), random.below(8) ? random.turn() : Quat::Identity()};
+  c.b = {b.shape.get(), scale, Vec3::Zero(), random.turn()};
+  const Vec3 n = (c.a.q * some_direction(a, random)).normalized();
+  if (random.below(3) == 0) {  // one of B's own directions along it
+    const Vec3 own = c.b.q * some_direction(b, random);
+    if (own.dot(n) < 0.5) c.b.q = (Quat::FromTwoVectors(own, -n) * c.b.q).normalized();
+  }
+  const double size = std::min(a.shape->bounding_radius, scale * b.shape->bounding_radius);
+  const double gap = random.sign() * size * random.log_uniform(least, most);
+  c.b.x = support_of(a, c.a, n) - support_of(b, c.b, -n) + gap * n;
+  c.overlap = [&a, &b, ca = c.a, cb = c.b](const Vec3& d) {
+    return d.dot(support_of(a, ca, d)) - d.dot(support_of(b, cb, -d)) - d.dot(cb.x - ca.x);
+  };
+  if (gap > 0) {
+    c.truth.gap = gap;
+    c.truth.has_normal = true;
+    c.truth.normal = n;
+  } else {
+    c.truth = search_least(c, a, b, random);
+  }
+  return c;
+}
+
+PairCase of_kind(Kind kind, Random& random) {
+  const Solid &a = any_of(kind, random), &b = partner(kind, random);
+  const double scale = random.below(3) ? random.uniform(0.3, 1.5) : 1.0;
+  PairCase c = place(random, a, b, scale, 1e-9, random.below(4) ? 1e-2 : 0.5);
+  if (random.below(3) == 0) {
+    c.warm = true;
+    c.a_before = c.a;
+    c.b_before = c.b;
+    c.b_before.q = random.below(2) ? random.turn() : (random.turn_by(0.01) * c.b.q).normalized();
+  }
+  return c;
+}
+
+// A ball, cone, lens or polyhedron a million times smaller or larger than its partner.
+PairCase far_sizes(Random& random, long) {
+  const auto body = [&]() -> const Solid& {
+    static const Solid oval = test::ellipsoid_solid(Vec3(1, 0.8, 0.6));
+    const int which = random.below(7);
+    return which == 6 ? oval : which == 5 ? unit_ball() : any_of(static_cast<Kind>(which), random);
+  };
+  const Solid &a = body(), &b = body();
+  const double ratio = random.log_uniform(1e3, 1e6);
+  PairCase c = place(random, a, b, random.below(2) ? ratio : 1 / ratio, 1e-6, 1e-2);
+  return c;
+}
+
+}  // namespace
+
+const std::vector<Solid>& solids_of(Kind kind) {
+  static std::map<Kind, std::vector<Solid>> made;
+  std::vector<Solid>& solids = made[kind];
+  if (!solids.empty()) return solids;
+  Random random(1000 + static_cast<int>(kind));
+  for (int k = 0; k < kBodies; ++k) solids.push_back(make_solid(kind, random, k));
+  return solids;
+}
+
+const std::vector<Family>& solid_families() {
+  constexpr long kPairs = 20000;
+  static const std::vector<Family> all = {
+      {"cones", "cones and double cones on each other, balls and others", kPairs,
+       [](Random& r, long) { return of_kind(Kind::cone, r); }},
+      {"cylinders", "cylinders and frusta, flat caps of collapsed edges", kPairs,
+       [](Random& r, long) { return of_kind(Kind::cylinder, r); }},
+      {"capsules", "capsules: straight sides, smooth poles", kPairs,
+       [](Random& r, long) { return of_kind(Kind::capsule, r); }},
+      {"lenses", "two caps and a sharp rim, thickness 1 to 1/60 of it", kPairs,
+       [](Random& r, long) { return of_kind(Kind::lens, r); }},
+      {"triangles", "polyhedra of bilinear patches with an edge collapsed", kPairs,
+       [](Random& r, long) { return of_kind(Kind::polyhedron, r); }},
+      {"size ratio 1e6", "the same, sizes 1e3 to 1e6 : 1", kPairs, far_sizes},
+  };
+  return all;
+}
+
+}  // namespace nurbs::families

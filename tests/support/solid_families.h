@@ -1,0 +1,19 @@
+// The failure table's families of bodies that are no smooth ovals: cones, cylinders, capsules, lenses,
+// polyhedra of degenerate patches, and bodies of very different sizes, with truths from closed forms.
+#pragma once
+
+#include <vector>
+
+#include "support/families.h"
+#include "support/solids.h"
+
+namespace nurbs::families {
+
+// A dozen bodies of each kind, made once.
+enum class Kind { cone, cylinder, capsule, lens, polyhedron };
+constexpr int kKinds = 5;
+const std::vector<test::Solid>& solids_of(Kind kind);
+
+const std::vector<Family>& solid_families();
+
+}  // namespace nurbs::families

@@ -1,0 +1,170 @@
+// Profiles revolved about z, and triangulated hulls; see solids.h.
+#include "support/solids.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "shapes/primitives.h"
+
+namespace nurbs::test {
+namespace {
+
+// Turns surfaces into a shape about its centre of mass and the support along with it. `support` is in the
+// frame before the turn.
+Solid finish(Random& random, const std::string& name, std::vector<NurbsSurface> surfaces,
+             std::function<Vec3(const Vec3&)> support, std::vector<Vec3> normals) {
+  const Mat3 turn = random.turn().toRotationMatrix();
+  for (NurbsSurface& s : surfaces)
+    for (Vec4& p : s.points) p.head<3>() = (turn * p.head<3>()).eval();
+  Solid solid;
+  solid.shape = make_shape(name, std::move(surfaces));
+  const Vec3 center = solid.shape->mass.center;
+  solid.support = [=](const Vec3& d) -> Vec3 { return turn * support(turn.transpose() * d) - center; };
+  for (const Vec3& n : normals) solid.normals.push_back(turn * n);
+  return solid;
+}
+
+// One point of a profile: radius, height, weight.
+using Profile = std::vector<std::array<double, 3>>;
+
+// Full turn of a profile of Bezier pieces of `degree` about z, bottom to top.
+NurbsSurface revolve(const Profile& profile, int degree) {
+  const double round = std::sqrt(0.5);
+  const double circle[9][2] = {{1, 0}, {1, 1}, {0, 1}, {-1, 1}, {-1, 0}, {-1, -1}, {0, -1}, {1, -1}, {1, 0}};
+  NurbsSurface s;
+  s.degree_u = 2;
+  s.degree_v = degree;
+  s.size_u = 9;
+  s.size_v = static_cast<int>(profile.size());
+  s.knots_u = {0, 0, 0, 0.25, 0.25, 0.5, 0.5, 0.75, 0.75, 1, 1, 1};
+  const int pieces = (s.size_v - 1) / degree;
+  s.knots_v.push_back(0);
+  for (int k = 0; k <= pieces; ++k) s.knots_v.insert(s.knots_v.end(), degree, double(k) / pieces);
+  s.knots_v.push_back(1);
+  for (int i = 0; i < 9; ++i)
+    for (const auto& [r, z, w] : profile) {
+      const double weight = w * (i % 2 ? round : 1);
+      s.points.push_back(weight * Vec4(r * circle[i][0], r * circle[i][1], z, 1));
+    }
+  return s;
+}
+
+// Any weights leave straight lines where they are.
+Profile polyline(Random& random, const std::vector<Vec2>& points, double weights) {
+  Profile profile;
+  for (const Vec2& p : points)
+    profile.push_back({p[0], p[1], weights > 1 ? random.log_uniform(1 / weights, weights) : 1.0});
+  return profile;
+}
+
+// Of the convex hull of circles and points on the axis.
+std::function<Vec3(const Vec3&)> support_of_circles(std::vector<Vec2> circles) {
+  return [circles](const Vec3& d) -> Vec3 {
+    const double across = std::hypot(d[0], d[1]);
+    Vec3 best = Vec3::Zero();
+    double most = -1e300;
+    for (const Vec2& c : circles) {
+      const double h = c[0] * across + c[1] * d[2];
+      if (!(h > most)) continue;
+      most = h;
+      best = across > 0 ? Vec3(c[0] * d[0] / across, c[0] * d[1] / across, c[1]) : Vec3(c[0], 0, c[1]);
+    }
+    return best;
+  };
+}
+
+Solid revolved_polyline(Random& random, const std::string& name, const std::vector<Vec2>& points,
+                        double weights) {
+  return finish(random, name, {revolve(polyline(random, points, weights), 1)}, support_of_circles(points),
+                {Vec3::UnitZ(), -Vec3::UnitZ()});
+}
+
+}  // namespace
+
+Solid cone(Random& random, double radius, double height, double weights) {
+  return revolved_polyline(random, "cone", {{0, 0}, {radius, 0}, {0, height}}, weights);
+}
+
+Solid double_cone(Random& random, double radius, double below, double above, double weights) {
+  return revolved_polyline(random, "double cone", {{0, -below}, {radius, 0}, {0, above}}, weights);
+}
+
+Solid cylinder(Random& random, double radius, double half, double weights) {
+  return revolved_polyline(random, "cylinder", {{0, -half}, {radius, -half}, {radius, half}, {0, half}},
+                           weights);
+}
+
+Solid frustum(Random& random, double low, double high, double height, double weights) {
+  return revolved_polyline(random, "frustum", {{0, 0}, {low, 0}, {high, height}, {0, height}}, weights);
+}
+
+Solid capsule(Random& random, double r, double half) {
+  const double w = std::sqrt(0.5);
+  const Profile profile = {{0, -half - r, 1}, {r, -half - r, w}, {r, -half, 1},   {r, 0, 1},
+                           {r, half, 1},      {r, half + r, w},  {0, half + r, 1}};
+  const auto support = [=](const Vec3& d) -> Vec3 {
+    return r * d.normalized() + (d[2] > 0 ? half : -half) * Vec3::UnitZ();
+  };
+  return finish(random, "capsule", {revolve(profile, 2)}, support, {});
+}
+
+Solid lens(Random& random, double bend) {
+  const double low = std::sqrt(bend * bend - 1);  // centre of a cap's sphere below the crease
+  const double half = 0.5 * std::asin(1 / bend);  // half of the cap's angle from its pole to the crease
+  const double top = bend - low, reach = bend * std::tan(half), w = std::cos(half);
+  const Profile profile = {{0, -top, 1}, {reach, -top, w}, {1, 0, 1}, {reach, top, w}, {0, top, 1}};
+  const auto support = [=](const Vec3& d) -> Vec3 {
+    const Vec3 n = d.normalized();
+    const double across = std::hypot(n[0], n[1]);
+    if (bend * across < 1) return bend * n - (n[2] > 0 ? low : -low) * Vec3::UnitZ();
+    return Vec3(n[0] / across, n[1] / across, 0);
+  };
+  return finish(random, "lens", {revolve(profile, 2)}, support, {Vec3::UnitZ(), -Vec3::UnitZ()});
+}
+
+Solid polyhedron(Random& random, int points, double squeeze, double weights) {
+  std::vector<Vec3> corners;
+  for (int k = 0; k < points; ++k)
+    corners.push_back(random.uniform(0.7, 1) * random.direction().cwiseProduct(Vec3(1, 1, squeeze)));
+  std::vector<NurbsSurface> faces;
+  std::vector<Vec3> normals;
+  const auto weight = [&] { return weights > 1 ? random.log_uniform(1 / weights, weights) : 1.0; };
+  for (int i = 0; i < points; ++i)
+    for (int j = 0; j < points; ++j)
+      for (int k = 0; k < points; ++k) {
+        if (i >= j || i >= k || j == k) continue;  // each face once, i its least corner
+        const Vec3 n = (corners[j] - corners[i]).cross(corners[k] - corners[i]);
+        if (std::any_of(corners.begin(), corners.end(),
+                        [&](const Vec3& x) { return n.dot(x - corners[i]) > 1e-14; }))
+          continue;
+        NurbsSurface s;
+        s.degree_u = s.degree_v = 1;
+        s.size_u = s.size_v = 2;
+        s.knots_u = s.knots_v = {0, 0, 1, 1};
+        const Vec3 at[4] = {corners[i], corners[k], corners[j], corners[k]};  // the edge v = 1 is corner k
+        for (const Vec3& x : at) {
+          const double w = weight();
+          s.points.emplace_back(w * x[0], w * x[1], w * x[2], w);
+        }
+        faces.push_back(s);
+        normals.push_back(n.normalized());
+      }
+  const auto support = [corners](const Vec3& d) -> Vec3 {
+    return *std::max_element(corners.begin(), corners.end(),
+                             [&](const Vec3& x, const Vec3& y) { return d.dot(x) < d.dot(y); });
+  };
+  return finish(random, "polyhedron", std::move(faces), support, normals);
+}
+
+Solid ellipsoid_solid(const Vec3& axes) {
+  Solid solid;
+  solid.shape = make_shape("ellipsoid", exact_ellipsoid(axes));
+  solid.support = [axes](const Vec3& d) -> Vec3 {
+    const Vec3 scaled = axes.cwiseProduct(d);
+    return axes.cwiseProduct(scaled) / scaled.norm();
+  };
+  return solid;
+}
+
+}  // namespace nurbs::test

@@ -1,0 +1,38 @@
+// Solids whose support functions are known in closed form, written as NURBS surfaces in the ways that break
+// contact searches: revolved about poles, made of patches with an edge collapsed to a point, weighted
+// unevenly, turned against the file's axes. The closed forms share nothing with src/.
+#pragma once
+
+#include <functional>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "body/shape.h"
+#include "support/random.h"
+
+namespace nurbs::test {
+
+struct Solid {
+  std::shared_ptr<const Shape> shape;
+  std::function<Vec3(const Vec3&)> support;  // point furthest along d (any length), frame of the shape: about
+                                             // its centre of mass
+  std::vector<Vec3> normals;  // of flat faces and other directions worth asking, frame of the shape
+};
+
+// Each turned by a random rotation baked into the control points, the weights of straight lines scaled by up
+// to `weights` and its inverse.
+Solid cone(Random& random, double radius, double height, double weights = 1);
+Solid double_cone(Random& random, double radius, double below, double above, double weights = 1);
+Solid cylinder(Random& random, double radius, double half_height, double weights = 1);
+Solid frustum(Random& random, double low, double high, double height, double weights = 1);
+Solid capsule(Random& random, double radius, double half_length);
+// Two spherical caps of radius `bend` that meet at a crease of radius 1; bend > 1.
+Solid lens(Random& random, double bend);
+// Convex hull of `points` points near a sphere squeezed along one axis, every face one bilinear patch with an
+// edge collapsed to a corner.
+Solid polyhedron(Random& random, int points, double squeeze, double weights = 1);
+// An exact ellipsoid of the library's, axes along the file's.
+Solid ellipsoid_solid(const Vec3& axes);
+
+}  // namespace nurbs::test
