@@ -171,21 +171,27 @@ Step inward_step(const Model& m, double size, const SurfacePoint& at, bool free_
   return along;
 }
 
-// What h(d) may exceed d . (surface point) by: from the point's normal, as in contact/certificate.h. Infinite
-// where the normal is round-off (poles, collapsed edges) or looks away from d.
-double excess_at(const Shape& shape, const Vec3& d, const SurfacePoint& at, const Vec3& su, const Vec3& sv) {
-  constexpr double kInfinity = std::numeric_limits<double>::infinity();
+// A surface normal and its error, rad; infinite where it is round-off (poles, collapsed edges).
+struct Normal {
+  Vec3 n;
+  double noise;
+};
+Normal normal_at(const Shape& shape, const Vec3& su, const Vec3& sv) {
   const Vec3 cross = su.cross(sv);
   const double area2 = cross.squaredNorm(), product2 = su.squaredNorm() * sv.squaredNorm();
   const double least = kPoleSpeed * shape.bounding_radius;
   if (!(area2 > kLeastSine * kLeastSine * product2 && area2 > least * least * least * least))
-    return kInfinity;
+    return {Vec3::Zero(), std::numeric_limits<double>::infinity()};
   const double area = std::sqrt(area2);
-  const Vec3 n = cross / area;
-  if (!(d.dot(n) > 0)) return kInfinity;
-  const double noise = kNormalNoise * std::sqrt(product2) / area;
-  const double chord = (d - n).norm() + noise, chord2 = chord * chord;
-  const RollingRadii radii = rolling_radii(shape, at, n);
+  return {cross / area, kNormalNoise * std::sqrt(product2) / area};
+}
+
+// What h(d) may exceed d . (surface point) by: from the point's normal, as in contact/certificate.h. Infinite
+// where there is none or it looks away from d.
+double excess_at(const Shape& shape, const Vec3& d, const SurfacePoint& at, const Normal& normal) {
+  if (!(d.dot(normal.n) > 0)) return std::numeric_limits<double>::infinity();
+  const double chord = (d - normal.n).norm() + normal.noise, chord2 = chord * chord;
+  const RollingRadii radii = rolling_radii(shape, at, normal.n);
   if (chord2 <= kNormalMargin * kNormalMargin && radii.near < kFarAway) return 0.5 * radii.near * chord2;
   return rolling_excess(radii.outer, shape.bounding_radius, chord2) + radii.slack;
 }
@@ -249,7 +255,9 @@ Support climb(const Shape& shape, const Vec3& d, SurfacePoint at) {
   best.slope = slope;
   best.point = jet.s;
   best.h = f;
-  best.upper = f + excess_at(shape, d, at, jet.su, jet.sv) + kRoundoff * size;
+  const Normal normal = normal_at(shape, jet.su, jet.sv);
+  best.normal = std::isfinite(normal.noise) ? normal.n : d;
+  best.upper = f + excess_at(shape, d, at, normal) + kRoundoff * size;
   return best;
 }
 
@@ -264,7 +272,10 @@ Support search_patches(const Shape& shape, const Vec3& d, const Support& low) {
   }
   Support s;
   s.where = top.where;
-  s.point = evaluate0(shape.patches[top.where.patch], top.where.u, top.where.v);
+  const Jet1 jet = evaluate1(shape.patches[top.where.patch], top.where.u, top.where.v);
+  const Normal normal = normal_at(shape, jet.su, jet.sv);
+  s.normal = std::isfinite(normal.noise) ? normal.n : d;
+  s.point = jet.s;
   s.h = d.dot(s.point);
   s.upper = std::max(top.upper, s.h);
   s.slope = 0;
@@ -283,6 +294,7 @@ Support begin(const Shape& shape, const Vec3& d, const SurfacePoint& at) {
   if (!shape.bilinear) return climb(shape, d, at);
   Support s;
   s.where = at;
+  s.normal = d;
   s.h = d.dot(evaluate0(shape.patches[at.patch], at.u, at.v));
   s.upper = std::numeric_limits<double>::infinity();
   return s;

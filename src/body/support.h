@@ -10,11 +10,12 @@ namespace nurbs {
 
 struct Support {
   SurfacePoint where;
-  Vec3 point = Vec3::Zero();  // shape frame, scale 1
-  double h = 0;               // d . point: a lower bound of the support function ...
-  double upper = 0;           // ... and a certified upper bound
-  double slope = 1;           // of d . x along the surface at the point, rad
-  int iterations = 0;         // of Newton, and boxes of the search over patches
+  Vec3 point = Vec3::Zero();   // shape frame, scale 1
+  Vec3 normal = Vec3::Zero();  // unit, of the surface there; d itself where the surface has none of its own
+  double h = 0;                // d . point: a lower bound of the support function ...
+  double upper = 0;            // ... and a certified upper bound
+  double slope = 1;            // of d . x along the surface at the point, rad
+  int iterations = 0;          // of Newton, and boxes of the search over patches
   bool converged = false;
 };
 

@@ -5,7 +5,6 @@
 #include <cmath>
 
 #include "contact/growing_hull.h"
-#include "contact/joint_newton.h"
 
 namespace nurbs {
 namespace {
@@ -14,15 +13,32 @@ namespace {
 struct Witness {
   Vec3 a, b;  // of the shrunk bodies
   Vec3 d;     // asked
+  double p;   // upper bound of the overlap along it
   SurfacePoint on_a, on_b;
 };
 
-// d(support point)/d(direction) of a body at a surface point whose normal is d, in the tangent plane spanned
-// by t and s: J (-H)^-1 J^T with J the tangents there and H the second derivatives of d . x. False where the
-// surface has no such map.
-bool support_turn(const Shape& shape, const SurfacePoint& at, const Vec3& d, const Vec3& t, const Vec3& s,
-                  double scale, Mat2* turn) {
+// d(support point)/d(direction) of a body at its support point in direction d, in the tangent plane spanned
+// by t and s: J (-H)^-1 J^T with J the tangents there and H the second derivatives of d . x, both for the
+// parameters that no edge holds back. False where the surface has no such map.
+bool support_turn(const Shape& shape, const SurfacePoint& at, const Vec3& d, const Vec3& asked, const Vec3& t,
+                  const Vec3& s, double scale, Mat2* turn) {
   const Jet2 j = evaluate2(shape.patches[at.patch], at.u, at.v);
+  const auto held = [&](double x, const Vec3& tangent) {
+    const double slope = asked.dot(tangent), length = tangent.norm();
+    return !(length > kHeldSpeed * shape.bounding_radius) || (x <= kOnEdge && slope < -kHeldSlope * length) ||
+           (x >= 1 - kOnEdge && slope > kHeldSlope * length);
+  };
+  const bool held_u = held(at.u, j.su), held_v = held(at.v, j.sv);
+  turn->setZero();
+  if (held_u && held_v) return true;
+  if (held_u || held_v) {
+    const Vec3& tangent = held_u ? j.sv : j.su;
+    const double bend = -d.dot(held_u ? j.svv : j.suu);
+    const Vec2 along(t.dot(tangent), s.dot(tangent));
+    if (!(bend * shape.bounding_radius > kFlatCurvature * tangent.squaredNorm())) return false;
+    *turn = scale / bend * along * along.transpose();
+    return true;
+  }
   Mat2 tangents, bend;
   tangents << t.dot(j.su), t.dot(j.sv), s.dot(j.su), s.dot(j.sv);
   bend << -d.dot(j.suu), -d.dot(j.suv), -d.dot(j.suv), -d.dot(j.svv);
@@ -34,51 +50,57 @@ bool support_turn(const Shape& shape, const SurfacePoint& at, const Vec3& d, con
   return turn->allFinite();
 }
 
+constexpr double kOneMinimum = 1 - 1e-6;  // cosine above which Newton has come to one minimum again
+constexpr double kFlatBend = 1e-3;        // of the overlap, of its bend along a crease
+
 // Everything the search over directions keeps.
 class Search {
  public:
   Search(const PairFrame& pair, double tolerance, double joggle)
       : pair_(pair), tolerance_(tolerance), joggle_(joggle), hull_(kSliver * pair.reach) {
-    shrink_a_ = pair.scale_a * pair.a->curvature.min_radius;
-    shrink_b_ = pair.scale_b * pair.b->curvature.min_radius;
+    // No ball that rolls inside is larger than the largest inside (a sphere's radii are bounds of it).
+    shrink_a_ = pair.scale_a * std::min(pair.a->curvature.min_radius, pair.a->inner_radius);
+    shrink_b_ = pair.scale_b * std::min(pair.b->curvature.min_radius, pair.b->inner_radius);
     (shrink_a_ < shrink_b_ ? shrink_a_ : shrink_b_) *= kCoreShare;
     shrink_ = shrink_a_ + shrink_b_;
   }
 
-  // Builds the first solid: along the seed and three directions that make a tetrahedron with it; where those
-  // are too flat, the axes as well.
+  // Builds the first solid: along the seed and three directions that make a tetrahedron with it; while those
+  // are flat, across the triangle (or the line) that they make.
   bool start(const Vec3& seed) {
     const Vec3 d = seed.squaredNorm() > 0 ? Vec3(seed.normalized()) : Vec3(Vec3::UnitX());
     const Vec3 t = d.unitOrthogonal(), s = d.cross(t);
     query(d, -1);
     for (const double angle : {0.0, 2.0943951023931953, 4.1887902047863905})
       query(-d / 3 + 0.9428090415820634 * (std::cos(angle) * t + std::sin(angle) * s), -1);
-    if (start_from_points(kFlatStart)) return true;
-    for (int k = 0; k < 3; ++k)
-      for (const double sign : {1.0, -1.0}) query(sign * Vec3::Unit(k), -1);
-    return start_from_points(0);
+    for (int round = 0; round < kFlatRounds; ++round) {
+      Vec3 across;
+      if (start_from_points(round + 1 == kFlatRounds ? 0 : kFlatStart, &across)) return true;
+      query(across, -1);
+      query(-across, -1);
+    }
+    return false;
   }
 
   void run(double enough) {
-    surround_best();
-    int settled = best_, polishes = 0, since = 0;
+    settle(best_);
     while (hull_.points() < kHullVertices) {
       const int near = best_face();
       if (near < 0 || upper_ - lower_ <= tolerance_ || lower_ > enough) return;
-      if (best_ != settled && ++since > kPolishAfter && polishes < kMostPolishes) {
-        // Another minimum than the seed's: straight to it.
-        since = 0;
-        ++polishes;
-        if (polish()) surround_best();
-        settled = best_;
-        continue;
-      }
-      const int start = closest_of(hull_.face(near), direction_to_ask_);
-      const int v = query(direction_to_ask_, start);
+      const std::array<short, 3> corners = hull_.face(near).vertex;
+      const int v = query(direction_to_ask_, closest_of(hull_.face(near), direction_to_ask_));
       if (v < 0 || upper_ - lower_ <= tolerance_) return;
-      if (hull_.grow(v, least_height()) != GrowingHull::Growth::grown) return;
+      if (hull_.grow(v, least_height()) != GrowingHull::Growth::grown) {
+        stalled_ = true;
+        return;
+      }
+      const bool low = witness_[v].p + lower_ <= kPolishAbove * std::abs(lower_);
+      if (!(low && settle(v)) && balances_ < kMostBalances) balance(corners, v);
     }
   }
+
+  // Whether round-off ended the search, so that other directions may do better.
+  bool stalled() const { return stalled_; }
 
   PolytopeResult result() const {
     PolytopeResult r;
@@ -123,16 +145,18 @@ class Search {
                   sb = find_hull_support(*pair_.b, on_b, near < 0 ? nullptr : &witness_[near].on_b,
                                          enough / pair_.scale_b);
     Witness& w = witness_[v];
-    w.a = pair_.place_a(sa.point) - shrink_a_ * d;
-    w.b = pair_.place_b(sb.point) + shrink_b_ * d;
+    // The centres of balls that touch there from inside lie in the cores, exactly.
+    w.a = pair_.place_a(sa.point) - shrink_a_ * sa.normal;
+    w.b = pair_.place_b(sb.point) - shrink_b_ * (pair_.turn * sb.normal);
     w.d = d;
     w.on_a = sa.where;
     w.on_b = sb.where;
+    const double p = pair_.scale_a * sa.upper + pair_.scale_b * sb.upper - d.dot(pair_.offset);
+    w.p = p;
     Vec3 g = w.a - w.b;
     if (joggle_ > 0) g += joggle_ * scatter(g);
     hull_.store(g);
     ++queries_;
-    const double p = pair_.scale_a * sa.upper + pair_.scale_b * sb.upper - d.dot(pair_.offset);
     if (-p > lower_) {
       lower_ = -p;
       direction_ = d;
@@ -142,30 +166,31 @@ class Search {
   }
 
   // The tetrahedron of largest volume among the points, greedily, and the others onto it. False where it is
-  // lower than `least` of its own size.
-  bool start_from_points(double least) {
-    int pick[4] = {0, -1, -1, -1};
+  // lower than `least` of its own size; `across` is then square to it.
+  bool start_from_points(double least, Vec3* across) {
+    int pick[4] = {0, 0, 0, 0};
     const auto g = [&](int k) -> const Vec3& { return hull_.point(k); };
-    double size = 0, volume = 0;
-    for (int want = 1; want < 4; ++want) {
+    const auto pick_largest = [&](int want, const auto& measure) {
       double best = 0;
-      for (int k = 0; k < hull_.points(); ++k) {
-        const Vec3 e = g(k) - g(pick[0]);
-        double measure;
-        if (want == 1)
-          measure = e.norm();
-        else if (want == 2)
-          measure = e.cross(g(pick[1]) - g(pick[0])).norm();
-        else
-          measure = std::abs(e.dot((g(pick[1]) - g(pick[0])).cross(g(pick[2]) - g(pick[0]))));
-        if (measure > best) {
-          best = measure;
+      for (int k = 1; k < hull_.points(); ++k) {
+        const double m = measure(g(k) - g(0));
+        if (m > best) {
+          best = m;
           pick[want] = k;
         }
       }
-      if (pick[want] < 0) return false;
-      (want == 1 ? size : volume) = best;
+      return best;
+    };
+    const double size = pick_largest(1, [](const Vec3& e) { return e.norm(); });
+    const Vec3 line = g(pick[1]) - g(0);
+    const double area = pick_largest(2, [&](const Vec3& e) { return line.cross(e).norm(); });
+    if (!(area > least * size * size)) {
+      *across = size > 0 ? line.unitOrthogonal() : witness_[0].d.unitOrthogonal();
+      return false;
     }
+    const Vec3 square = line.cross(g(pick[2]) - g(0));
+    const double volume = pick_largest(3, [&](const Vec3& e) { return std::abs(e.dot(square)); });
+    *across = square.normalized();
     if (!(volume > least * size * size * size)) return false;
     if (!hull_.start(pick[0], pick[1], pick[2], pick[3])) return false;
     for (int k = 0; k < hull_.points(); ++k)
@@ -173,55 +198,135 @@ class Search {
     return true;
   }
 
+  // W_A + W_B of the cores at the supports of point v, in the tangent plane of d spanned by t and s: what
+  // p(d) of the cores bends by there, but for p itself.
+  bool core_turn(int v, const Vec3& d, const Vec3& t, const Vec3& s, Mat2* turn) const {
+    Mat2 wa, wb;
+    const Witness& w = witness_[v];
+    const Mat3 back = pair_.turn.transpose();
+    if (!support_turn(*pair_.a, w.on_a, d, w.d, t, s, pair_.scale_a, &wa)) return false;
+    if (!support_turn(*pair_.b, w.on_b, -(back * d), -(back * w.d), back * t, back * s, pair_.scale_b, &wb))
+      return false;
+    *turn = wa + wb - shrink_ * Mat2::Identity();
+    return true;
+  }
+
+  // Goes from point v to the minimum of p that it is near and surrounds it. False where one has been
+  // surrounded before or p has no smooth minimum.
+  bool settle(int v) {
+    if (minima_ == kMostMinima) return false;
+    for (int k = 0; k < minima_; ++k)
+      if (witness_[v].d.dot(minimum_[k]) > kSameMinimum) return false;
+    bool smooth, known = false;
+    v = polish(v, &smooth);
+    for (int k = 0; k < minima_; ++k) known |= witness_[v].d.dot(minimum_[k]) > kOneMinimum;
+    minimum_[minima_++] = witness_[v].d;
+    if (!smooth || known) return false;
+    if (witness_[v].p + lower_ <= kSurroundAbove * std::abs(lower_)) surround(v);
+    return true;
+  }
+
+  // Newton on p(d): its gradient is the support pair's offset in the tangent plane, its Hessian W_A + W_B -
+  // p.
+  int polish(int v, bool* smooth) {
+    *smooth = false;
+    for (int k = 0; k < kPolishIterations; ++k) {
+      const Vec3 d = witness_[v].d, t = d.unitOrthogonal(), s = d.cross(t), g = hull_.point(v);
+      Mat2 hessian;
+      if (!core_turn(v, d, t, s, &hessian)) break;
+      hessian -= d.dot(g) * Mat2::Identity();
+      const double det = hessian.determinant();
+      if (!(hessian(0, 0) > 0 && det > kSingular * hessian(0, 0) * hessian(1, 1))) break;
+      const Vec2 gradient(t.dot(g), s.dot(g));
+      Vec2 step(hessian(0, 1) * gradient[1] - hessian(1, 1) * gradient[0],
+                hessian(0, 1) * gradient[0] - hessian(0, 0) * gradient[1]);
+      step /= det;
+      const double length = step.norm();
+      // What is left to gain is half of step . gradient.
+      *smooth = !(-step.dot(gradient) > kPolishGain * tolerance_);
+      if (*smooth) break;
+      if (length > kLongestPolish) step *= kLongestPolish / length;
+      const int next = query((d + step[0] * t + step[1] * s).normalized(), v);
+      if (next < 0) break;
+      if (hull_.faces() > 0) hull_.grow(next, least_height());
+      if (!(witness_[next].p < witness_[v].p)) {  // round-off is all that is left
+        *smooth = -step.dot(gradient) < tolerance_;
+        break;
+      }
+      v = next;
+    }
+    return v;
+  }
+
+  // Where p(d) is least in a crease, two supports u and v are level (a cone's tip and its rim): Newton on p
+  // along the crease, with the weights that leave no slope across it. Bends of a share of each support's.
+  void balance(const std::array<short, 3>& corners, int v) {
+    int u = corners[0];
+    for (const short k : corners)
+      if ((hull_.point(k) - hull_.point(v)).squaredNorm() > (hull_.point(u) - hull_.point(v)).squaredNorm())
+        u = k;
+    Vec3 d = witness_[v].d;
+    for (int k = 0; k < kBalanceSteps; ++k) {
+      const Vec3 gu = hull_.point(u), gv = hull_.point(v), apart = gu - gv;
+      Vec3 e = apart - d.dot(apart) * d;
+      const double length = e.norm();
+      if (!(length > kNoDirection * pair_.reach)) return;
+      e /= length;
+      const Vec3 along = d.cross(e);
+      const double share = -gv.dot(e) / length;
+      if (!(share > 0 && share < 1)) return;
+      const Vec3 g = share * gu + (1 - share) * gv;
+      if (!(g.dot(d) < -(lower_ + shrink_))) return;  // nothing to gain
+      Mat2 turn_u, turn_v;
+      if (!core_turn(u, d, e, along, &turn_u) || !core_turn(v, d, e, along, &turn_v)) return;
+      const double bend = share * turn_u(1, 1) + (1 - share) * turn_v(1, 1) - g.dot(d);
+      // On an axis of revolution all directions round it are as good.
+      double step = bend > kFlatBend * std::abs(g.dot(d)) ? -g.dot(along) / bend : 0;
+      step = std::clamp(step, -kLongestPolish, kLongestPolish);
+      const Vec3 next = (d - d.dot(apart) / length * e + step * along).normalized();
+      if (!((next - d).squaredNorm() > kStationary * kStationary)) return;
+      d = next;
+      const int before = best_;
+      ++balances_;
+      const int w = query(d, v);
+      if (w < 0) return;
+      hull_.grow(w, least_height());
+      if (best_ == before) return;
+      ((hull_.point(w) - hull_.point(u)).squaredNorm() < (hull_.point(w) - hull_.point(v)).squaredNorm()
+           ? u
+           : v) = w;
+    }
+  }
+
   // Round a deep minimum d the hull's faces have to shrink to the root of the tolerance. Points x = W (n - d)
   // of a ring of normals n lie x . W^-1 x / 2 below d's plane; with them the hull reaches as far as d's along
   // every direction up to w / delta times the ring's (w: least eigenvalue of W, delta: depth). Rings that far
   // apart leave the search little else to find.
-  void surround_best() {
+  void surround(int from) {
     const double depth = -(lower_ + shrink_);
     if (!(depth > 0)) return;
-    const int from = best_;
-    const Vec3 d = direction_, t = d.unitOrthogonal(), s = d.cross(t);
-    Mat2 wa, wb;
-    const Witness& w = witness_[from];
-    const bool round = support_turn(*pair_.a, w.on_a, d, t, s, pair_.scale_a, &wa) &&
-                       support_turn(*pair_.b, w.on_b, pair_.direction_on_b(d), pair_.turn.transpose() * t,
-                                    pair_.turn.transpose() * s, pair_.scale_b, &wb);
-    if (!round) return;
-    Mat2 along = wa + wb - shrink_ * Mat2::Identity();
-    Mat2 axes = Mat2::Identity();
-    const double mean = 0.5 * along.trace(), half = 0.5 * (along(0, 0) - along(1, 1)),
-                 spread = std::hypot(half, along(0, 1)), least = mean - spread, most = mean + spread;
+    const Vec3 d = witness_[from].d, t = d.unitOrthogonal(), s = d.cross(t);
+    Mat2 turn;
+    if (!core_turn(from, d, t, s, &turn)) return;
+    const double mean = 0.5 * turn.trace(), half = 0.5 * (turn(0, 0) - turn(1, 1)),
+                 spread = std::hypot(half, turn(0, 1)), least = mean - spread, most = mean + spread;
     if (!(least > kLeastSpread * depth)) return;
-    const double angle = 0.5 * std::atan2(along(0, 1), half);
-    axes << std::cos(angle), -std::sin(angle), std::sin(angle), std::cos(angle);
+    const double angle = 0.5 * std::atan2(turn(0, 1), half);
+    const Vec3 long_axis = std::cos(angle) * t + std::sin(angle) * s, short_axis = d.cross(long_axis);
     const double ratio = std::clamp(kRingShare * least / depth, kLeastRing, kMostRing);
     double phase = 0;
     // r: root of twice the drop.
-    for (double r = std::sqrt(tolerance_); r / std::sqrt(most) < kWidestRing; r *= ratio) {
+    for (double r = std::sqrt(tolerance_); r < kWidestRing * std::sqrt(most); r *= ratio) {
       for (int k = 0; k < 4; ++k) {
-        const double turn = phase + 0.5 * M_PI * k;
-        const Vec2 tilt =
-            axes * Vec2(r * std::cos(turn) / std::sqrt(most), r * std::sin(turn) / std::sqrt(least));
-        if (tilt.norm() > kWidestTilted) continue;
-        const int v = query((d + tilt[0] * t + tilt[1] * s).normalized(), from);
+        const double x = r * std::cos(phase + 0.5 * M_PI * k) / std::sqrt(most),
+                     y = r * std::sin(phase + 0.5 * M_PI * k) / std::sqrt(least);
+        if (std::hypot(x, y) > kWidestTilted) continue;
+        const int v = query((d + x * long_axis + y * short_axis).normalized(), from);
         if (v < 0) return;
         hull_.grow(v, least_height());
       }
       phase += M_PI / 4;
     }
-  }
-
-  // Newton from the best points to the minimum they are near.
-  bool polish() {
-    const Witness& w = witness_[best_];
-    const JointSolution s = solve_joint(pair_, w.on_a, w.on_b, tolerance_, kFarAway, kPolishIterations);
-    if (!s.converged && !s.stationary) return false;
-    const int before = best_;
-    const int v = query(s.normal, best_);
-    if (v < 0) return false;
-    hull_.grow(v, least_height());
-    return best_ != before;
   }
 
   // In the unit cube, the same for equal points and in no relation for others.
@@ -296,7 +401,9 @@ class Search {
   double shrink_a_, shrink_b_, shrink_;
   double lower_ = -kFarAway, upper_ = kFarAway;
   Vec3 direction_ = Vec3::UnitX(), direction_to_ask_ = Vec3::UnitX();
-  int best_ = 0, queries_ = 0;
+  int best_ = 0, queries_ = 0, balances_ = 0, minima_ = 0;
+  bool stalled_ = false;
+  Vec3 minimum_[kMostMinima];  // directions surrounded
   Witness witness_[kHullVertices];
   GrowingHull hull_;
 };
@@ -312,12 +419,13 @@ PolytopeResult solve_polytope(const PairFrame& pair, const Vec3& seed, double to
   for (int attempt = 0; attempt < kHullAttempts; ++attempt) {
     const double joggle = attempt > 0 ? std::min(kJoggle * pair.reach, 0.05 * tolerance) : 0.0;
     Search search(pair, tolerance, joggle);
-    if (search.start(from)) search.run(enough);
+    const bool started = search.start(from);
+    if (started) search.run(enough);
     const PolytopeResult result = search.result();
     const int spent = attempt > 0 ? best.iterations : 0;
     if (attempt == 0 || result.bracket.width() < best.bracket.width()) best = result;
     best.iterations = spent + result.iterations;
-    if (best.converged || best.bracket.lower > enough) break;
+    if (best.converged || best.bracket.lower > enough || (started && !search.stalled())) break;
     from = best.bracket.direction + kHullTurn * (attempt + 1) * Vec3(0.36, -0.48, 0.8);
   }
   return best;

@@ -162,17 +162,26 @@ constexpr double kForceDepth = 1e-3;       // of the smaller radius: overlaps ar
 constexpr double kLocalDrift = 20;         // of the tolerance that the contact points may be off
 
 // --- polytope method
-constexpr int kHullVertices = 512;      // support pairs a fallback may spend; 20 to 80 are usual
-constexpr int kHullFaces = 2048;        // twice the vertices, and room for those being replaced
+constexpr int kHullVertices = 768;      // support pairs a fallback may spend; 20 to 80 are usual
+constexpr int kHullFaces = 3072;        // twice the vertices, and room for those being replaced
 constexpr int kHullAttempts = 3;        // from other directions, when round-off stalled the hull
 constexpr double kHullTurn = 0.2;       // between them
 constexpr double kCoreShare = 0.5;      // of the smaller of the bodies' least curvature radii taken off, the
                                         // other wholly: more would leave two spheres no volume
 constexpr double kFlatStart = 1e-3;     // volume of a first tetrahedron over its longest edge cubed, at least
+constexpr int kFlatRounds = 4;          // of looking for a better one
 constexpr double kLeastHeight = 0.02;   // of the tolerance: a point less high above a face is not added
-constexpr double kSupportShare = 0.02;  // of the tolerance that a support may lack
-constexpr int kPolishAfter = 3;  // queries after which another minimum than the seed's is gone straight to
-constexpr int kMostPolishes = 6;
+constexpr double kSupportShare = 1e-5;  // of the tolerance that a support may lack
+constexpr int kMostMinima = 8;          // of p(d) that are gone straight to and surrounded
+constexpr double kPolishAbove = 0.1;  // of the least overlap seen: one more than that above it is no minimum
+constexpr double kSurroundAbove = 1e-3;  // the same for surrounding it
+constexpr double kSameMinimum = 0.98;    // cosine above which two are one
+constexpr int kMostBalances = 40;
+constexpr double kPolishGain = 1e-3;    // of the tolerance, below which a minimum has been reached
+constexpr double kLongestPolish = 0.3;  // rad in one step
+constexpr int kBalanceSteps = 4;        // of Newton along a crease of p(d)
+constexpr double kHeldSlope = 1e-9;     // of d . x across a patch's edge: steeper, the edge holds the support
+constexpr double kHeldSpeed = 1e-6;     // of a parameter, over the bounding radius; slower, at a pole
 constexpr double kRingShare = 1.6;  // of w / depth between the rings of directions about a deep minimum ...
 constexpr double kLeastRing = 2, kMostRing = 16;  // ... with these limits
 constexpr double kLeastSpread = 1e-3;             // of the depth: the least w worth rings

@@ -90,7 +90,8 @@ Truth search_least(const PairCase& c, const Solid& a, const Solid& b, Random& ra
   truth.known = Known::bound;
   double least = 1e300;
   for (Start m : minima) {
-    for (double stride = 0.05; stride > 1e-12;) {
+    int moves = 0;
+    for (double stride = 0.05; stride > 1e-12 && moves < 600; ++moves) {
       const Vec3 t = m.d.cross(random.direction()).normalized(), s = m.d.cross(t);
       Start next = m;
       for (const Vec3& step : {t, Vec3(-t), s, Vec3(-s)}) {
