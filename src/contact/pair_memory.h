@@ -128,6 +128,11 @@ ContactResult solve_contact(const Particle& a, const Particle& b, const ContactS
 ContactResult solve_plane_contact(const Particle& particle, double height, const Vec3& normal,
                                   const ContactSettings& settings, PairMemory& memory);
 
+// Up to round-off. A quaternion that is none, or no number, isn't.
+inline bool is_unit(const Quat& q) {
+  return std::abs(q.squaredNorm() - 1) <= kUnitTurn;
+}
+
 inline bool finite(const Particle& p) {
   return std::isfinite(p.x.sum() + p.q.coeffs().sum() + p.scale) && p.scale > 0;
 }

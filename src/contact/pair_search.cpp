@@ -31,6 +31,20 @@ NURBS_INLINE bool safe(const Particle& a, const Particle& b, double enough, cons
          set_separated((std::sqrt(spheres2) - reach) * kRounded, enough, Rung::safe, r);
 }
 
+// Moves the points along the normal until they are the gap apart: it was clamped into its bracket.
+void agree(ContactResult* r) {
+  const Vec3 shift = 0.5 * (r->gap - r->normal.dot(r->point_b - r->point_a)) * r->normal;
+  r->point_a -= shift;
+  r->point_b += shift;
+}
+
+// Drifted quaternions would scale the bodies.
+Particle with_unit_turn(const Particle& p) {
+  Particle unit = p;
+  unit.q.normalize();
+  return unit;
+}
+
 class Ladder {
  public:
   Ladder(const Particle& a, const Particle& b, const ContactSettings& settings, PairMemory& memory)
@@ -194,7 +208,10 @@ class Ladder {
     r.status = r.lower > settings_.reach ? Status::separated
                : s.converged             ? Status::converged
                                          : Status::unresolved;
-    if (r.status == Status::separated) r.gap = r.lower;
+    if (r.status == Status::separated)
+      r.gap = r.lower;
+    else
+      agree(&r);
     return r;
   }
 
@@ -237,6 +254,11 @@ __attribute__((noinline)) void climb(const Particle& a, const Particle& b, const
 
 ContactResult find_contact(const Particle& a, const Particle& b, const ContactSettings& settings,
                            double* memory) {
+  if (!is_unit(a.q) || !is_unit(b.q)) {
+    const Particle unit_a = with_unit_turn(a), unit_b = with_unit_turn(b);
+    if (is_unit(unit_a.q) && is_unit(unit_b.q)) return find_contact(unit_a, unit_b, settings, memory);
+    return ContactResult();
+  }
   if (settings.solver == Solver::cso) return find_contact_cso(a, b, settings, memory);
   PairMemory& m = memory_at(memory);
   adopt(pair_stamp(stamp(a), stamp(b), settings.solver), &m);

@@ -201,6 +201,12 @@ class PlaneLadder {
 
 ContactResult find_plane_contact(const Particle& particle, const Vec3& origin, const Vec3& normal,
                                  const ContactSettings& settings, double* memory) {
+  if (!is_unit(particle.q)) {
+    Particle unit = particle;
+    unit.q.normalize();
+    if (!is_unit(unit.q)) return ContactResult();
+    return find_plane_contact(unit, origin, normal, settings, memory);
+  }
   PairMemory& m = memory_at(memory);
   adopt(pair_stamp(stamp(normal), stamp(particle), Solver::ladder), &m);
   return PlaneLadder(particle, normal.dot(particle.x - origin), normal, settings, m).run();

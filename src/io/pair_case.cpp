@@ -24,10 +24,39 @@ double number(const json& value) {
   return std::strtod(value.get<std::string>().c_str(), nullptr);
 }
 
+// Every bit of the homogeneous control points, which a shape file's points and weights would lose.
+json to_json(const NurbsSurface& s) {
+  json out;
+  out["degrees"] = {s.degree_u, s.degree_v};
+  out["sizes"] = {s.size_u, s.size_v};
+  for (const double k : s.knots_u) out["knots_u"].push_back(exact(k));
+  for (const double k : s.knots_v) out["knots_v"].push_back(exact(k));
+  for (const Vec4& p : s.points)
+    for (int k = 0; k < 4; ++k) out["points"].push_back(exact(p[k]));
+  return out;
+}
+
+NurbsSurface surface_from_json(const json& in) {
+  NurbsSurface s;
+  s.degree_u = in.at("degrees").at(0);
+  s.degree_v = in.at("degrees").at(1);
+  s.size_u = in.at("sizes").at(0);
+  s.size_v = in.at("sizes").at(1);
+  for (const json& k : in.at("knots_u")) s.knots_u.push_back(number(k));
+  for (const json& k : in.at("knots_v")) s.knots_v.push_back(number(k));
+  const json& points = in.at("points");
+  for (size_t k = 0; k + 3 < points.size(); k += 4)
+    s.points.emplace_back(number(points[k]), number(points[k + 1]), number(points[k + 2]),
+                          number(points[k + 3]));
+  return s;
+}
+
 json to_json(const Particle& p) {
   json out;
   out["name"] = p.shape->name;
   out["shape"] = json::parse(write_shape({p.shape->surfaces, p.shape->gyration}));
+  for (const NurbsSurface& s : p.shape->surfaces) out["exact"].push_back(to_json(s));
+  for (int k = 0; k < 9; ++k) out["exact_gyration"].push_back(exact(p.shape->gyration(k / 3, k % 3)));
   out["scale"] = exact(p.scale);
   for (int k = 0; k < 3; ++k) out["x"].push_back(exact(p.x[k]));
   for (const double q : {p.q.w(), p.q.x(), p.q.y(), p.q.z()}) out["q"].push_back(exact(q));
@@ -35,7 +64,14 @@ json to_json(const Particle& p) {
 }
 
 Particle from_json(const json& in, const std::string& file, std::shared_ptr<const Shape>* shape) {
-  const ShapeFileContent content = parse_shape(in.at("shape").dump(), file);
+  ShapeFileContent content = parse_shape(in.at("shape").dump(), file);
+  if (in.contains("exact")) {  // older cases have the shape alone
+    content.surfaces.clear();
+    for (const json& s : in.at("exact")) content.surfaces.push_back(surface_from_json(s));
+    Mat3 gyration;
+    for (int k = 0; k < 9; ++k) gyration(k / 3, k % 3) = number(in.at("exact_gyration").at(k));
+    content.gyration = gyration;
+  }
   *shape = make_shape(in.at("name").get<std::string>(), content.surfaces, content.gyration);
   Particle p;
   p.shape = shape->get();

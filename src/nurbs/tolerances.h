@@ -134,6 +134,9 @@ constexpr int kConcaveSteps = 8;       // of Newton in a concave box
 constexpr double kConcaveRest = 1e-6;  // of the slack: what the gradient left may hide
 constexpr double kSupportSlack = 2;    // round-offs of a body that its support may lack
 
+// --- particles
+constexpr double kUnitTurn = 1e-14;  // of a quaternion's squared length: within it the body is its own size
+
 // --- certificate
 constexpr double kLeastTolerance =
     6 * kRoundoff;  // of the larger radius: no bracket of the gap can be narrower

@@ -21,6 +21,7 @@ Particle Bodies::particle(int i) const {
   p.x = Vec3::Map(arrays_.x + 3 * i);
   const double* q = arrays_.quaternion + 4 * i;
   p.q = Quat(q[0], q[1], q[2], q[3]);
+  if (!(std::abs(p.q.squaredNorm() - 1) <= kUnitTurn)) p.q.normalize();
   return p;
 }
 
