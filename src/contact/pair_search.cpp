@@ -97,7 +97,11 @@ class Ladder {
     JointSolution s = solve_joint(pair, warm_point(memory_.on_a, *pair.a), warm_point(memory_.on_b, *pair.b),
                                   tolerance, settings_.reach, kWarmIterations);
     r->iterations = s.iterations;
-    if (!s.converged && !confirm(pair, tolerance, s)) return false;
+    if (!s.converged && !confirm(pair, tolerance, s)) {
+      if (!is_too_deep(s)) return false;
+      *r = fallback(pair, &s, s.normal, tolerance, s.iterations);
+      return true;
+    }
     const double turned2_a = turned2(a_.q, memory_.proof.q_a), turned2_b = turned2(b_.q, memory_.proof.q_b);
     *r = finish(pair, s, s.normal, Rung::warm, s.iterations);
     if (r->status == Status::converged) remember_model(pair, s, turned2_a, turned2_b);
@@ -127,6 +131,9 @@ class Ladder {
     return s.converged;
   }
 
+  // A minimum of p that may not be the only one, whatever certificate: the polytope finds the others.
+  static bool is_too_deep(const JointSolution& s) { return s.stationary && -s.gap > s.bracket.unique; }
+
   // Newton from the supports along a guessed direction, certified or not.
   JointSolution polish(const PairFrame& pair, const DirectionGuess& guess, double tolerance) const {
     const Support a = find_hull_support(*pair.a, guess.d);
@@ -152,6 +159,7 @@ class Ladder {
         if (!joint.stationary || (have && joint.gap <= best.gap)) continue;
         best = joint;
         have = true;
+        if (is_too_deep(joint)) return fallback(pair, &best, joint.normal, tolerance, spent);
       }
       if (scanned) break;
       found += guess_directions(pair, guesses + found, kColdGuesses);

@@ -50,6 +50,7 @@ bool support_turn(const Shape& shape, const SurfacePoint& at, const Vec3& d, con
   return turn->allFinite();
 }
 
+constexpr int kMostIdle = 30;             // queries in a row that leave the bracket as it is
 constexpr double kOneMinimum = 1 - 1e-6;  // cosine above which Newton has come to one minimum again
 constexpr double kFlatBend = 1e-3;        // of the overlap, of its bend along a crease
 
@@ -84,9 +85,16 @@ class Search {
 
   void run(double enough) {
     settle(best_);
-    while (hull_.points() < kHullVertices) {
+    double last = kFarAway;
+    for (int idle = 0; hull_.points() < kHullVertices; ++idle) {
       const int near = best_face();
       if (near < 0 || upper_ - lower_ <= tolerance_ || lower_ > enough) return;
+      if (upper_ - lower_ < last) idle = 0;
+      last = upper_ - lower_;
+      if (idle > kMostIdle) {
+        stalled_ = true;
+        return;
+      }
       const std::array<short, 3> corners = hull_.face(near).vertex;
       const int v = query(direction_to_ask_, closest_of(hull_.face(near), direction_to_ask_));
       if (v < 0 || upper_ - lower_ <= tolerance_) return;
@@ -363,15 +371,21 @@ class Search {
   // Unit direction from the nearest point to the origin, square to the face or edge it lies in: the origin
   // may be so near that the difference alone has lost the digits that separate flat faces.
   Vec3 away_from(const GrowingHull::Face& f, const Vec3& closest) const {
-    int on[3], count = 0;
-    for (int k = 0; k < 3; ++k)
-      if (f.weights[k] > 0) on[count++] = f.vertex[k];
-    Vec3 d = -closest;
-    if (count == 2) {
-      const Vec3 edge = (hull_.point(on[1]) - hull_.point(on[0])).normalized();
-      d -= edge.dot(d) * edge;
+    int count = 0, zero = 0;
+    for (int k = 0; k < 3; ++k) f.weights[k] > 0 ? ++count : zero = k;
+    if (count != 2) return -closest.normalized();
+    const int from = (zero + 1) % 3, to = (zero + 2) % 3;
+    const GrowingHull::Face& other = hull_.face(f.across[from]);
+    if (!f.sliver && !other.sliver) {
+      // Between the normals of the two faces, where no far point rises above the edge.
+      const double c = f.normal.dot(other.normal);
+      const double wf = std::max(0.0, -(f.offset - c * other.offset)),
+                   wo = std::max(0.0, -(other.offset - c * f.offset));
+      const Vec3 d = wf * f.normal + wo * other.normal;
+      if (d.squaredNorm() > 0 && d.dot(closest) < 0) return d.normalized();
     }
-    return d.normalized();
+    const Vec3 edge = (hull_.point(f.vertex[to]) - hull_.point(f.vertex[from])).normalized();
+    return (edge.dot(closest) * edge - closest).normalized();
   }
 
   // The witnesses of direction_: the hull's point nearest to the origin or, when that is inside, to its foot

@@ -1,0 +1,137 @@
+// The growing hull alone: convex and closed after every point, whatever order and however degenerate, and
+// untouched by a growth that fails.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <memory>
+#include <vector>
+
+#include "contact/growing_hull.h"
+#include "support/random.h"
+
+namespace nurbs {
+namespace {
+
+using test::Random;
+using Growth = GrowingHull::Growth;
+
+constexpr double kSliverHeight = 1e-13, kEps = 1e-13;
+
+int alive(const GrowingHull& hull) {
+  int n = 0;
+  for (int k = 0; k < hull.faces(); ++k) n += hull.face(k).alive;
+  return n;
+}
+
+// How far the highest stored point lies above a face.
+double worst_height(const GrowingHull& hull) {
+  double worst = 0;
+  for (int k = 0; k < hull.faces(); ++k) {
+    const GrowingHull::Face& f = hull.face(k);
+    if (!f.alive || f.sliver) continue;
+    for (int p = 0; p < hull.points(); ++p) worst = std::max(worst, f.normal.dot(hull.point(p)) - f.offset);
+  }
+  return worst;
+}
+
+std::unique_ptr<GrowingHull> tetrahedron() {
+  auto hull = std::make_unique<GrowingHull>(kSliverHeight);
+  for (const Vec3& p : {Vec3(1, 1, 1), Vec3(1, -1, -1), Vec3(-1, 1, -1), Vec3(-1, -1, 1)}) hull->store(p);
+  EXPECT_TRUE(hull->start(0, 1, 2, 3));
+  return hull;
+}
+
+TEST(GrowingHull, a_tetrahedron_is_closed_and_knows_its_nearest_face) {
+  const auto hull = tetrahedron();
+  EXPECT_TRUE(hull->closed());
+  EXPECT_EQ(alive(*hull), 4);
+  const GrowingHull::Nearest near = hull->nearest();
+  EXPECT_TRUE(near.inside);
+  EXPECT_NEAR(std::sqrt(near.distance2), 1 / std::sqrt(3.0), 1e-15);
+}
+
+TEST(GrowingHull, stays_convex_and_closed_over_random_points) {
+  Random random(1);
+  for (int body = 0; body < 40; ++body) {
+    auto hull = std::make_unique<GrowingHull>(kSliverHeight);
+    for (int k = 0; k < 4; ++k) hull->store(random.direction());
+    ASSERT_TRUE(hull->start(0, 1, 2, 3));
+    for (int k = 0; k < 150; ++k) {
+      const bool on_ball = k % 2;
+      const Vec3 p = on_ball ? random.direction() : random.box(-1, 1);
+      const Growth growth = hull->grow(hull->store(p), kEps);
+      ASSERT_TRUE(growth == Growth::grown || growth == Growth::inside);
+    }
+    EXPECT_TRUE(hull->closed());
+    EXPECT_LT(worst_height(*hull), 1e-12);
+    EXPECT_EQ(alive(*hull) % 2, 0);  // Euler: F = 2 V - 4
+  }
+}
+
+// Points of a lattice: many on every plane, edge and corner, in any order. Some are refused there (what they
+// see is no disc up to round-off); the surface stays closed and inside the true hull.
+TEST(GrowingHull, stays_closed_and_inside_on_a_lattice) {
+  Random random(2);
+  for (int body = 0; body < 60; ++body) {
+    const Quat turn = body % 3 ? random.turn() : Quat::Identity();
+    std::vector<Vec3> points;
+    for (int i = 0; i < 5; ++i)
+      for (int j = 0; j < 5; ++j)
+        for (int k = 0; k < 5; ++k) points.push_back(turn * Vec3(i - 2, j - 2, k - 2));
+    std::shuffle(points.begin(), points.end(), random.engine());
+    auto hull = std::make_unique<GrowingHull>(kSliverHeight);
+    for (const Vec3& corner : {Vec3(0, 0, 0), Vec3(1, 0, 0), Vec3(0, 1, 0), Vec3(0, 0, 1)})
+      hull->store(turn * corner);
+    ASSERT_TRUE(hull->start(0, 1, 2, 3));
+    for (const Vec3& p : points) ASSERT_NE(hull->grow(hull->store(p), 1e-12), Growth::full);
+    EXPECT_TRUE(hull->closed());
+    if (hull->nearest().inside) {
+      EXPECT_LE(std::sqrt(hull->nearest().distance2), 2 + 1e-12);
+    }
+  }
+}
+
+TEST(GrowingHull, four_points_of_a_plane_are_no_start) {
+  GrowingHull hull(kSliverHeight);
+  for (const Vec3& p : {Vec3(0, 0, 0), Vec3(1, 0, 0), Vec3(0, 1, 0), Vec3(1, 1, 0), Vec3(0, 0, 1)})
+    hull.store(p);
+  EXPECT_FALSE(hull.start(0, 1, 2, 3));
+  EXPECT_EQ(hull.nearest().face, -1);
+  EXPECT_TRUE(hull.start(0, 1, 2, 4));
+  EXPECT_TRUE(hull.closed());
+}
+
+// A growth that fails leaves the surface as it was, and the next one that succeeds starts from that.
+TEST(GrowingHull, a_point_that_is_refused_changes_nothing) {
+  const auto hull = tetrahedron();
+  const int before = alive(*hull);
+  EXPECT_EQ(hull->grow(hull->store(Vec3(0.1, 0, 0)), kEps), Growth::inside);
+  EXPECT_EQ(hull->grow(hull->store(Vec3::Constant(std::nan(""))), kEps), Growth::inside);
+  EXPECT_EQ(alive(*hull), before);
+  EXPECT_TRUE(hull->closed());
+  EXPECT_EQ(hull->grow(hull->store(Vec3(-2, -2, -2)), kEps), Growth::grown);
+  EXPECT_EQ(alive(*hull), 6);
+  EXPECT_TRUE(hull->closed());
+}
+
+TEST(GrowingHull, says_when_it_is_full) {
+  Random random(3);
+  const auto hull = tetrahedron();
+  while (hull->points() < kHullVertices)
+    ASSERT_EQ(hull->grow(hull->store(2 * random.direction()), kEps) == Growth::broken, false);
+  EXPECT_EQ(hull->store(Vec3::Zero()), -1);
+  EXPECT_TRUE(hull->closed());
+}
+
+TEST(GrowingHull, origin_outside_is_as_far_as_the_nearest_triangle) {
+  auto hull = std::make_unique<GrowingHull>(kSliverHeight);
+  for (const Vec3& p : {Vec3(3, 1, 0), Vec3(3, -1, 0), Vec3(4, 0, 1), Vec3(4, 0, -1)}) hull->store(p);
+  ASSERT_TRUE(hull->start(0, 1, 2, 3));
+  const GrowingHull::Nearest near = hull->nearest();
+  EXPECT_FALSE(near.inside);
+  EXPECT_NEAR(std::sqrt(near.distance2), 3, 1e-15);
+}
+
+}  // namespace
+}  // namespace nurbs
