@@ -36,17 +36,18 @@ void paint(const Vec3& center, double angle, double radius, NormalMap& map) {
 // The same for caps of any width.
 void paint_wide(const Vec3& center, double angle, double radius, NormalMap& map) {
   const float value = std::nextafter(static_cast<float>(radius), std::numeric_limits<float>::infinity());
-  const double cell_angle = 1.5 / map.cells;  // half a cell's diagonal, at most
+  const double reach = angle + 1.5 / map.cells;  // half a cell's diagonal, at most
+  const double cosine = reach < M_PI ? std::cos(reach) - kRoundoff : -2;
   for (int face = 0; face < 6; ++face)
     for (int i = 0; i < map.cells; ++i)
       for (int j = 0; j < map.cells; ++j) {
+        float& cell = map.radius[(face * map.cells + i) * map.cells + j];
+        if (cell >= value) continue;
         Vec3 d;
         d[face / 2] = face % 2 ? -1 : 1;
         d[(face / 2 + 1) % 3] = (2.0 * i + 1) / map.cells - 1;
         d[(face / 2 + 2) % 3] = (2.0 * j + 1) / map.cells - 1;
-        if (angle_between(d, center) > angle + cell_angle) continue;
-        float& cell = map.radius[(face * map.cells + i) * map.cells + j];
-        cell = std::max(cell, value);
+        if (d.dot(center) >= cosine * d.norm()) cell = value;
       }
 }
 

@@ -317,11 +317,11 @@ TEST(Joints, kinks_are_bounded_and_signed) {
       }
 }
 
-// Gap of two bodies by minimising p over directions, supports by exhaustive search: nothing of the ladder.
+// Gap of two bodies by minimising p over directions, supports by sampling: nothing of the ladder.
 double least_overlap(const Particle& a, const Particle& b, const Vec3& near) {
   const auto p = [&](const Vec3& d) {
-    return a.scale * exhaustive_support(*a.shape, a.q.conjugate() * d) +
-           b.scale * exhaustive_support(*b.shape, b.q.conjugate() * Vec3(-d)) - d.dot(b.x - a.x);
+    return a.scale * sampled_support(*a.shape, a.q.conjugate() * d) +
+           b.scale * sampled_support(*b.shape, b.q.conjugate() * Vec3(-d)) - d.dot(b.x - a.x);
   };
   Vec3 best = near.normalized();
   double least = p(best);

@@ -12,7 +12,7 @@ using test::Solid;
 
 namespace {
 
-constexpr int kBodies = 12;
+constexpr int kBodies = 6;
 
 Solid make_solid(Kind kind, Random& random, int k) {
   const double weights = k % 3 == 2 ? 1e3 : 1;
