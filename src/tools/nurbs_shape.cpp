@@ -15,9 +15,9 @@
 #include <vector>
 
 #include "body/mass_properties.h"
+#include "body/proofs.h"
 #include "body/shape.h"
 #include "body/support.h"
-#include "body/proofs.h"
 #include "io/shape_file.h"
 #include "nurbs/affine.h"
 #include "shapes/primitives.h"

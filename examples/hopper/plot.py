@@ -1,0 +1,68 @@
+#!/usr/bin/python3
+"""Discharge rates and a picture of the runs of in.hopper: plot.py FOLDER. Reads FOLDER/SHAPE/discharge.txt."""
+import pathlib
+import sys
+
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1]))
+from draw_bed import draw  # noqa: E402
+
+import matplotlib  # noqa: E402
+import numpy as np  # noqa: E402
+
+matplotlib.use("Agg")
+import matplotlib.pyplot as plt  # noqa: E402
+
+VOLUME, HOLE, DENSITY, G = 4 / 3 * np.pi * 3e-3**3, 0.03, 2500.0, 9.81
+OPENED, DT = 8000, 1e-4  # step, s
+ASPECT = {"flat": 0.6, "sphere": 1.0, "long": 1.5, "needle": 2.5}
+STEADY = 0.2  # s, until the flow is
+
+
+def discharge(folder):
+    """Time since the lid is gone, and the grains that are left."""
+    step, left = np.loadtxt(folder / "discharge.txt", unpack=True)
+    return (step - OPENED) * DT, left
+
+
+def rate(folder):
+    """Grains a second, and its standard error by tenths of the time (flow fluctuates)."""
+    t, left = discharge(folder)
+    t, left = t[t >= STEADY], left[t >= STEADY]
+    ends = np.linspace(0, len(t) - 1, 11).astype(int)
+    parts = -np.diff(left[ends]) / np.diff(t[ends])
+    return parts.mean(), parts.std(ddof=1) / np.sqrt(len(parts))
+
+
+def main(folder):
+    shapes = [s for s in ASPECT if (folder / s / "discharge.txt").exists()]
+    rates = {s: rate(folder / s) for s in shapes}
+    grain = 2 * 3e-3
+    beverloo = 0.58 * 0.6 * DENSITY * np.sqrt(G) * (HOLE - 1.4 * grain) ** 2.5 / (DENSITY * VOLUME)
+    with open(folder / "rates.csv", "w") as f:
+        print("shape,aspect,grains_per_second,error,to_spheres", file=f)
+        for s in shapes:
+            print(f"{s},{ASPECT[s]},{rates[s][0]:.1f},{rates[s][1]:.1f},{rates[s][0] / rates['sphere'][0]:.3f}", file=f)
+            print(f"{s:8} a/b {ASPECT[s]}: {rates[s][0]:.0f} +- {rates[s][1]:.0f} grains/s,"
+                  f" {rates[s][0] / rates['sphere'][0]:.2f} of the spheres'")
+    print(f"Beverloo for spheres (C 0.58, k 1.4, solid fraction 0.6): {beverloo:.0f} grains/s")
+    figure, axes = plt.subplots(1, 2, figsize=(9, 3.6))
+    for s in shapes:
+        axes[0].plot(*discharge(folder / s), label=f"a/b {ASPECT[s]}")
+    axes[0].set_xlabel("time, s")
+    axes[0].set_ylabel("grains above the orifice")
+    axes[0].legend()
+    value, error = (np.array([rates[s][k] for s in shapes]) / rates["sphere"][0] for k in (0, 1))
+    axes[1].errorbar([ASPECT[s] for s in shapes], value, error, fmt="o", capsize=3)
+    axes[1].set_xlabel("aspect ratio a/b")
+    axes[1].set_ylabel("rate / spheres'")
+    axes[1].set_xscale("log")
+    axes[1].set_xticks([ASPECT[s] for s in shapes], [str(ASPECT[s]) for s in shapes])
+    axes[1].minorticks_off()
+    figure.tight_layout()
+    figure.savefig(folder / "discharge.png", dpi=110)
+    show = shapes[-1] if "long" not in shapes else "long"
+    draw(folder / show / "hopper-12000.vtu", folder / "hopper.png", towards=(0.3, -1, 0.25), size=(420, 800),
+         walls=[folder / show / "silo.stl"], zoom=1.5)
+
+
+main(pathlib.Path(sys.argv[1]))
