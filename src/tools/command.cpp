@@ -8,6 +8,7 @@
 #include <cstdio>
 #include <cstring>
 #include <fstream>
+#include <utility>
 
 namespace nurbs {
 
@@ -31,6 +32,18 @@ void write_whole(const std::string& file, const std::string& text) {
 
 void print_warnings(const std::vector<std::string>& warnings) {
   for (const std::string& warning : warnings) std::fprintf(stderr, "WARNING: %s\n", warning.c_str());
+}
+
+double parse_unit(const std::string& command, const std::string& text) {
+  for (const auto& [name, length] :
+       {std::pair{"um", 1e-3}, {"mm", 1.0}, {"cm", 10.0}, {"m", 1e3}, {"in", 25.4}})
+    if (text == name) return length;
+  double value = 0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+  if (error != std::errc() || end != text.data() + text.size() || !(value >= 1e-9 && value <= 1e9))
+    throw UsageError(command + ": --unit is '" + text +
+                     "', must be um, mm, cm, m, in or 1e-9 to 1e9 millimetres");
+  return value;
 }
 
 double parse_share(const std::string& option, const std::string& text, double most) {

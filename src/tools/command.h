@@ -34,6 +34,7 @@ struct Command {
 };
 Command add_fit(CLI::App& app);
 Command add_simplify(CLI::App& app);
+Command add_import(CLI::App& app);
 Command add_export(CLI::App& app);
 Command add_view(CLI::App& app);
 
@@ -41,6 +42,9 @@ std::string format(const char* pattern, double value);
 
 // Writes beside `file` and renames, so that `file` is whole or untouched.
 void write_whole(const std::string& file, const std::string& text);
+
+// The millimetres of "mm", "cm", "m", "um", "in" or a number; throws UsageError that names `command`.
+double parse_unit(const std::string& command, const std::string& text);
 
 void print_warnings(const std::vector<std::string>& warnings);
 

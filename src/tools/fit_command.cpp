@@ -1,4 +1,6 @@
 // nurbs-shape fit, simplify: smooth convex bodies for meshes and for shapes finer than needed.
+#include "tools/fit_command.h"
+
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
@@ -14,15 +16,11 @@
 namespace nurbs {
 namespace {
 
-constexpr double kLeastTolerance = 2e-4, kMostTolerance = 0.5;
+constexpr double kFinest = 2e-4, kCoarsest = 0.5;
 constexpr double kWeld = 1e-7;  // of the extent: points closer are one
 constexpr int kSpansAtMost = 8;
 constexpr int kSampleGrid =
     64;  // per patch parameter of a body to simplify, over all Bezier patches of a side
-
-struct FitArguments {
-  std::string file, output, tolerance = "1%", patches, keep, piece;
-};
 
 double extent(const TriangleMesh& mesh) {
   Eigen::AlignedBox3d box;
@@ -54,8 +52,7 @@ size_t chosen_piece(const FitArguments& a, const std::vector<TriangleMesh>& piec
 }
 
 // One closed piece, wound outward.
-TriangleMesh load_piece(const FitArguments& a) {
-  const TriangleMesh raw = read_mesh_file(a.file);
+TriangleMesh closed_piece(const FitArguments& a, const TriangleMesh& raw) {
   const double size = extent(raw);
   if (!(size > 0)) throw ShapeError(a.file + ": all points coincide");
   const std::vector<TriangleMesh> pieces = split_pieces(weld(raw, kWeld * size));
@@ -117,10 +114,17 @@ HullFit fit_with_progress(const ConvexHull& hull, double tolerance, int spans) {
   return fit_hull(hull, options);
 }
 
-void fit(const FitArguments& a) {
-  const double tolerance = parse_share("fit: --tolerance", a.tolerance, kMostTolerance);
-  if (tolerance < kLeastTolerance)
-    throw UsageError("fit: --tolerance is " + a.tolerance + ", must be 0.02% at least");
+}  // namespace
+
+double fit_tolerance(const std::string& command, const std::string& text) {
+  const double tolerance = parse_share(command + ": --tolerance", text, kCoarsest);
+  if (tolerance < kFinest)
+    throw UsageError(command + ": --tolerance is " + text + ", must be 0.02% at least");
+  return tolerance;
+}
+
+void fit_mesh(const FitArguments& a, const TriangleMesh& raw) {
+  const double tolerance = fit_tolerance("fit", a.tolerance) - a.sag;
   const int spans = spans_of(a.patches);
   bool keep_volume = false, keep_inertia = false;
   if (!a.keep.empty()) {
@@ -129,7 +133,7 @@ void fit(const FitArguments& a) {
     if (a.keep != "volume" && a.keep != "inertia" && a.keep != "volume,inertia" && a.keep != "inertia,volume")
       throw UsageError("fit: --keep is " + a.keep + ", must be volume, inertia or volume,inertia");
   }
-  const TriangleMesh mesh = load_piece(a);
+  const TriangleMesh mesh = closed_piece(a, raw);
   const MassProperties own = mesh_properties(mesh);
   if (!(own.volume > 0)) throw ShapeError(a.file + ": encloses no volume");
   std::unique_ptr<ConvexHull> hull;
@@ -171,6 +175,8 @@ void fit(const FitArguments& a) {
   print_differences("the mesh", mass, own, best.radius);
 }
 
+namespace {
+
 // Points of a body on a grid over every Bezier patch, about as dense whatever the patches.
 std::vector<Vec3> sample(const Shape& shape) {
   const int n =
@@ -192,7 +198,7 @@ size_t control_points(const std::vector<NurbsSurface>& surfaces) {
 }
 
 void simplify(const FitArguments& a) {
-  const double tolerance = parse_share("simplify: --tolerance", a.tolerance, kMostTolerance);
+  const double tolerance = parse_share("simplify: --tolerance", a.tolerance, kCoarsest);
   std::vector<std::string> warnings;
   const auto shape = read_shape_file(a.file, &warnings);
   print_warnings(warnings);
@@ -253,7 +259,10 @@ Command add_fit(CLI::App& app) {
       ->type_name("WHAT");
   command->add_option("--piece", a->piece, "of a mesh of several pieces: largest, or its number")
       ->type_name("P");
-  return {command, [a] { fit(*a); }};
+  return {command, [a] {
+            fit_tolerance("fit", a->tolerance);
+            fit_mesh(*a, read_mesh_file(a->file));
+          }};
 }
 
 Command add_simplify(CLI::App& app) {

@@ -36,6 +36,7 @@ constexpr char kExamples[] =
     "  nurbs-shape make superellipsoid --axes 1,1,2 --exponent 4 --spans 5 blocky.json\n"
     "  nurbs-shape make inertia --inertia 1.0,0.9,0.8,-0.04,0.02,0.09 --mass 2 stone.json\n"
     "  nurbs-shape fit grain.stl --tolerance 2% -o grain.json\n"
+    "  nurbs-shape import part.step --unit m -o part.json\n"
     "  nurbs-shape info ellipsoid.json\n"
     "  nurbs-shape check ellipsoid.json\n";
 
@@ -676,7 +677,8 @@ void run(CLI::App& app, int argc, char** argv) {
   const CLI::App* describer = add_reader("info", "describes a shape");
   const CLI::App* checker =
       add_reader("check", "exits with 0 if the file is a usable shape, 1 with the reason if not");
-  const Command commands[] = {add_fit(app), add_simplify(app), add_export(app), add_view(app)};
+  const Command commands[] = {add_fit(app), add_simplify(app), add_import(app), add_export(app),
+                              add_view(app)};
   app.parse(argc, argv);
 
   for (const Command& command : commands)

@@ -1,7 +1,8 @@
-// nurbs-shape view, export: a body for other programs, as exact cells (VTU), triangles (STL) or a picture
-// (PNG).
+// nurbs-shape view, export: a body for other programs, as exact faces (STEP), exact cells (VTU), triangles
+// (STL) or a picture (PNG).
 #include <unistd.h>
 
+#include <cerrno>
 #include <cmath>
 #include <cstdint>
 #include <cstdio>
@@ -13,13 +14,14 @@
 
 #include "io/shape_file.h"
 #include "io/vtu_file.h"
+#include "tools/cad_file.h"
 #include "tools/command.h"
 
 namespace nurbs {
 namespace {
 
 struct Arguments {
-  std::string file, output, tolerance = "0.1%";
+  std::string file, output, tolerance = "0.1%", unit = "mm";
 };
 
 constexpr int kMostCells = 400;  // of an STL grid, per Bezier patch parameter
@@ -98,12 +100,29 @@ std::string stl(const Shape& shape, double error, size_t* count) {
   return out + body;
 }
 
+void export_step(const Arguments& a, const Shape& shape, double unit) {
+  const std::string draft = a.output + "." + std::to_string(getpid()) + ".tmp";
+  double volume = 0;
+  try {
+    volume = write_step_file(shape, unit, draft);
+    if (std::rename(draft.c_str(), a.output.c_str()) != 0) throw ShapeError(std::strerror(errno));
+  } catch (const ShapeError& error) {
+    std::remove(draft.c_str());
+    throw ShapeError(a.output + ": " + error.what());
+  }
+  std::printf("%s: solid of %.6g mm^3, %.4g mm across\n", a.output.c_str(), volume,
+              2 * unit * shape.bounding_radius);
+}
+
 void export_shape(const Arguments& a) {
   const double share = parse_share("export: --tolerance", a.tolerance, 0.1);
   const std::string kind = ending(a.output);
-  if (kind != ".stl" && kind != ".vtu")
-    throw UsageError("export: ending '" + kind + "' is not known; -o takes .stl or .vtu");
+  const bool is_step = kind == ".step" || kind == ".stp";
+  if (kind != ".stl" && kind != ".vtu" && !is_step)
+    throw UsageError("export: ending '" + kind + "' is not known; -o takes .stl, .vtu, .step or .stp");
+  const double unit = parse_unit("export", a.unit);
   const auto shape = load(a.file);
+  if (is_step) return export_step(a, *shape, unit);
   if (kind == ".vtu") {
     write_whole(a.output, vtu(*shape));
     std::printf("%s: %zu exact cells\n", a.output.c_str(), shape->patches.size());
@@ -159,15 +178,23 @@ void view(const Arguments& a) {
 }  // namespace
 
 Command add_export(CLI::App& app) {
-  CLI::App* command = app.add_subcommand("export", "writes STL triangles or VTU cells for other programs");
-  command->formatter(std::make_shared<Help>("nurbs-shape export FILE [--tolerance T] -o FILE.stl|vtu"));
+  CLI::App* command =
+      app.add_subcommand("export", "writes STEP, STL triangles or VTU cells for other programs");
+  command->formatter(std::make_shared<Help>("nurbs-shape export FILE [options] -o FILE.step|stl|vtu"));
   const auto a = std::make_shared<Arguments>();
   command->add_option("FILE", a->file, "shape file")->required();
-  command->add_option("-o", a->output, "file to write: .stl, or .vtu (exact rational Bezier cells)")
+  command
+      ->add_option("-o", a->output,
+                   "file to write: .step (exact faces), .stl, or .vtu (exact rational Bezier cells)")
       ->type_name("FILE")
       ->required();
   command->add_option("--tolerance", a->tolerance, "of STL triangles, of the bounding radius, default 0.1%")
       ->type_name("T");
+  command
+      ->add_option(
+          "--unit", a->unit,
+          "of STEP: the shape file's unit of length, um, mm, cm, m, in or a number of mm; default mm")
+      ->type_name("U");
   return {command, [a] { export_shape(*a); }};
 }
 

@@ -71,7 +71,7 @@ class View(unittest.TestCase):
         self.assertEqual(sorted(p.name for p in self.place.iterdir()), ["egg.json", "egg.png", "egg.vtu"])
 
     def test_bad_requests(self):
-        for arguments in (["view", self.shape, "-o", "a.gif"], ["export", self.shape, "-o", "a.step"],
+        for arguments in (["view", self.shape, "-o", "a.gif"], ["export", self.shape, "-o", "a.3dm"],
                           ["export", self.place / "none.json", "-o", self.place / "a.stl"],
                           ["export", self.shape, "--tolerance", "0", "-o", self.place / "a.stl"]):
             run = call(*arguments)
