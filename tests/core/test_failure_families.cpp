@@ -18,10 +18,10 @@ namespace {
 #ifdef __SANITIZE_ADDRESS__
 constexpr long kSearchedSample = 20;
 #else
-constexpr long kSearchedSample = 100;
+constexpr long kSearchedSample = 60;
 #endif
 
-constexpr int kUnresolvedSolids = 8;  // of some 600
+constexpr int kUnresolvedSolids = 5;  // of some 400
 
 // Families that name few pairs have dear truths.
 long sample_of(const Family& family) {
