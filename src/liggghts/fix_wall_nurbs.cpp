@@ -500,7 +500,7 @@ int FixWallNurbs::unpack_exchange(int i, double* buffer) {
 
 void FixWallNurbs::write_restart(FILE* file) {
   const nurbs::EnergyLedger& done = stages_.dissipated();
-  double mine[2] = {done.damping, done.friction}, all[3] = {0, 0, time_};
+  double mine[2] = {done.damping, done.friction}, all[4] = {0, 0, time_, listed() ? 1.0 : 0.0};
   MPI_Reduce(mine, all, 2, MPI_DOUBLE, MPI_SUM, 0, world);
   if (comm->me != 0) return;
   const int size = sizeof all;
@@ -513,6 +513,13 @@ void FixWallNurbs::restart(char* buffer) {
   nurbs::EnergyLedger& done = stages_.dissipated();
   done = nurbs::EnergyLedger{};
   time_ = last_time_ = values[2];
+  was_another_kind_ = (values[3] != 0) != listed();
+  if (was_another_kind_)
+    nurbs_host::warn(
+        FLERR, lmp,
+        std::string("Fix wall/nurbs ") + id +
+            ": in the restart, the wall of this ID was of another kind (a plane at rest, or a moving "
+            "plane, cylinder or mesh); its contacts begin anew");
   if (comm->me != 0) return;
   done.damping = values[0];
   done.friction = values[1];
@@ -529,6 +536,10 @@ int FixWallNurbs::pack_restart(int i, double* buffer) {
 
 void FixWallNurbs::unpack_restart(int i, int nth) {
   double* values = atom->extra[i];
+  if (was_another_kind_) {  // what is remembered is none of this wall's
+    proof(i) = nurbs::PairProof{};
+    return;
+  }
   for (int k = 0; k < nth; ++k) values += static_cast<int>(*values);
   unpack_exchange(i, values + 1);
 }

@@ -126,6 +126,7 @@ class FixWallNurbs : public Fix {
   nurbs::ContactStages stages_;
   nurbs::BodyRecord wall_{};
   bool ledger_ = false;
+  bool was_another_kind_ = false;  // in the restart that is read
   bool periodic_warned_ = false;
   std::string last_warning_, last_deep_warning_;
 };

@@ -252,6 +252,10 @@ void PairGranNurbs::compute_force(int eflag, int vflag, int addflag) {
     evflag = vflag_fdotr = 0;
   nurbs::ContactStages::Step step;
   step.bodies = &bodies_->update_bodies(freeze_group_bit_);
+  if (neighbor->ago == 0 && atom->natoms > checked_particles_) {  // inserted ones may be lighter
+    checked_particles_ = atom->natoms;
+    warn_time_step();
+  }
   if (neighbor->ago == 0) hand_in_neighbours();
   step.owned = atom->nlocal;
   step.dt = update->dt;

@@ -103,6 +103,7 @@ class PairGranNurbs : public PairGran {
   AtomVecNurbs* bodies_ = nullptr;
   nurbs::ContactStages stages_;
   bool ledger_ = false;
+  bigint checked_particles_ = 0;  // when the time step was last checked
   bool short_box_warned_ = false;
   std::string last_warning_, last_deep_warning_;
 };

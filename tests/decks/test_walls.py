@@ -261,6 +261,22 @@ class MovingWalls(unittest.TestCase):
                     start="newton off\ncommunicate single vel yes\nread_restart half.rst\n")
         np.testing.assert_allclose(last(other), last(one), rtol=0, atol=1e-9)
 
+    def test_a_restart_into_a_wall_of_another_kind(self):
+        """A floor that lay still is given again so that it moves, or as a mesh, and back: contacts begin anew, which is said."""
+        floor = "plane 0 0 0 0 0 1"
+        still = LAW + " move linear 0 0 0"
+        first = {"plane": run(floor, steps="run 4000\nwrite_restart a.rst"),
+                 "moving": run(floor, law=still, steps="run 4000\nwrite_restart a.rst")}
+        sheets = {"mesh": sheet(2, 0.19), "before": MESH}
+        for kind, wall, law, options in (("plane", floor, still, {}), ("plane", "mesh m", LAW, sheets), ("moving", floor, LAW, {})):
+            for ranks in (1, 2):
+                other = run(wall, law=law, steps="run 500", ranks=ranks, files={"a.rst": first[kind].path / "a.rst"},
+                            start="newton off\ncommunicate single vel yes\nread_restart a.rst\n", **options)
+                self.assertIn("its contacts begin anew", other.screen)
+                start = first[kind].thermo["v_ledger" if "v_ledger" in first[kind].thermo else "ledger"][-1]
+                self.assertLess(abs(other.thermo["ledger"][-1] - start), 0.02 * start)
+                self.assertEqual(other.thermo["st[10]"][-1], 0)
+
 
 class Cylinders(unittest.TestCase):
 
