@@ -11,6 +11,9 @@ namespace nurbs {
 namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
+// Cells spent on the least radius, over kMostCells: loose, it costs every turning contact of the body a cold
+// solve.
+constexpr int kLeastRadiusBudget = 4;
 
 struct Open {
   Leaf leaf;
@@ -125,8 +128,8 @@ class Bounder {
         add(std::move(leaf), 0);
       }
     const int most = kMostCells + kMostCellsPerPatch * patches_;
-    if (!sphere_) halve_while([this](const Open& o) { return least_loose(o); }, most / 2);
-    halve_while([this](const Open& o) { return radii_loose(o); }, most);
+    if (!sphere_) halve_while([this](const Open& o) { return least_loose(o); }, kLeastRadiusBudget * most);
+    halve_while([this](const Open& o) { return radii_loose(o); }, std::max(most, out_.cells + most / 2));
     begin_rates();
     halve_while([this](const Open& o) { return rate_loose(o); },
                 out_.cells + kMostRateCells + kMostCellsPerPatch * patches_);
