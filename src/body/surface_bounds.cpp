@@ -45,8 +45,9 @@ std::vector<Cell> first_cells(const Shape& shape, const std::vector<BezierPatch>
       c = edge % 2 ? std::move(second) : std::move(first);
       while (links[edge].collapsed && (edge < 2 ? c.du : c.dv) > kPoleStrip) {
         auto [lower, upper] = halve(surface, c, edge < 2);
-        cells.push_back(edge % 2 ? std::move(lower) : std::move(upper));
-        c = edge % 2 ? std::move(upper) : std::move(lower);
+        if (edge % 2) std::swap(lower, upper);
+        cells.push_back(std::move(upper));
+        c = std::move(lower);
       }
       cells.push_back(std::move(c));
     }
