@@ -73,26 +73,10 @@ Field squared_distance(const BezierPatch& patch, double sign) {
   return f;
 }
 
-// Halves rows of `count` coefficients `stride` apart by de Casteljau at 1/2; `a` keeps the first half, `b`
-// gets the second.
-void halve_row(double* a, double* b, int degree, size_t stride) {
-  for (int i = 0; i <= degree; ++i) {
-    b[(degree - i) * stride] = a[degree * stride];
-    for (int k = degree; k > i; --k) a[k * stride] = 0.5 * (a[k * stride] + a[(k - 1) * stride]);
-  }
-}
-
 std::pair<Field, Field> halve(Field f, bool in_u) {
   Field g = f;
-  const size_t width = f.n + 1;
-  for (auto* c : {&f.num, &f.den}) {
-    std::vector<double>& d = c == &f.num ? g.num : g.den;
-    if (in_u) {
-      for (size_t j = 0; j < width; ++j) halve_row(c->data() + j, d.data() + j, f.m, width);
-    } else {
-      for (int i = 0; i <= f.m; ++i) halve_row(c->data() + i * width, d.data() + i * width, f.n, 1);
-    }
-  }
+  halve_net(f.num.data(), g.num.data(), f.m, f.n, in_u);
+  halve_net(f.den.data(), g.den.data(), f.m, f.n, in_u);
   update_upper(f);
   update_upper(g);
   return {std::move(f), std::move(g)};

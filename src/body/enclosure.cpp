@@ -5,6 +5,7 @@
 #include <limits>
 
 #include "body/affine_form.h"
+#include "nurbs/bernstein.h"
 #include "nurbs/tolerances.h"
 
 namespace nurbs {
@@ -331,30 +332,13 @@ void set_pole(const BezierPatch& patch, int edge, Cell* cell) {
     }
 }
 
-namespace {
-
-// `a` keeps the lower half of a net, `b`, a copy of it, gets the upper one (de Casteljau).
-void halve_net(int p, int q, bool in_u, std::vector<Vec4>* net_a, std::vector<Vec4>* net_b) {
-  const int lines = in_u ? q + 1 : p + 1, degree = in_u ? p : q, stride = in_u ? q + 1 : 1,
-            next = in_u ? 1 : q + 1;
-  for (int line = 0; line < lines; ++line) {
-    Vec4* a = net_a->data() + line * next;
-    Vec4* b = net_b->data() + line * next;
-    for (int i = 0; i <= degree; ++i) {
-      b[(degree - i) * stride] = a[degree * stride];
-      for (int k = degree; k > i; --k) a[k * stride] = 0.5 * (a[k * stride] + a[(k - 1) * stride]);
-    }
-  }
-}
-
-}  // namespace
-
 std::pair<Cell, Cell> halve(const BezierPatch& patch, const Cell& cell, bool in_u) {
   std::pair<Cell, Cell> halves{cell, cell};
   const int p = patch.degree_u, q = patch.degree_v;
-  halve_net(p, q, in_u, &halves.first.net, &halves.second.net);
+  halve_net(halves.first.net.data(), halves.second.net.data(), p, q, in_u);
   if (cell.pole >= 0)
-    halve_net(cell.pole < 2 ? p - 1 : p, cell.pole < 2 ? q : q - 1, in_u, &halves.first.z, &halves.second.z);
+    halve_net(halves.first.z.data(), halves.second.z.data(), cell.pole < 2 ? p - 1 : p,
+              cell.pole < 2 ? q : q - 1, in_u);
   if (in_u) {
     halves.first.du = halves.second.du = 0.5 * cell.du;
     halves.second.u0 += 0.5 * cell.du;

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "nurbs/bernstein.h"
 #include "nurbs/tolerances.h"
 
 namespace nurbs {
@@ -38,31 +39,15 @@ void copy(const Box& from, Box* to) {
   if (from.rational) std::copy_n(from.w, from.size(), to->w);
 }
 
-// De Casteljau at the middle of one line of coefficients.
-void halve_line(const double* in, int degree, int stride, double* low, double* high) {
-  double a[kMaxDegree + 1];
-  for (int i = 0; i <= degree; ++i) a[i] = in[i * stride];
-  for (int k = 0; k <= degree; ++k) {
-    low[k * stride] = a[0];
-    high[(degree - k) * stride] = a[degree - k];
-    for (int i = 0; i < degree - k; ++i) a[i] = 0.5 * (a[i] + a[i + 1]);
-  }
-}
-
 void halve(const Box& box, bool along_u, Box* low, Box* high) {
-  low->set_header(box);
+  copy(box, low);
   high->set_header(box);
   if (along_u)
     low->u1 = high->u0 = 0.5 * (box.u0 + box.u1);
   else
     low->v1 = high->v0 = 0.5 * (box.v0 + box.v1);
-  const int row = box.nv + 1;
-  const int lines = along_u ? row : box.nu + 1, degree = along_u ? box.nu : box.nv;
-  const int stride = along_u ? row : 1, next = along_u ? 1 : row;
-  for (int k = 0; k < lines; ++k) {
-    halve_line(box.f + k * next, degree, stride, low->f + k * next, high->f + k * next);
-    if (box.rational) halve_line(box.w + k * next, degree, stride, low->w + k * next, high->w + k * next);
-  }
+  halve_net(low->f, high->f, box.nu, box.nv, along_u);
+  if (box.rational) halve_net(low->w, high->w, box.nu, box.nv, along_u);
 }
 
 // Keeps one edge of the box: `high` u (or v) only.

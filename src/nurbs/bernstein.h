@@ -72,15 +72,31 @@ Bernstein<T> without_root_at_0(const Bernstein<T>& a) {
   return b;
 }
 
-// On [0, 1/2] and [1/2, 1], by de Casteljau.
+// De Casteljau at 1/2 on degree + 1 coefficients `stride` apart: `a` keeps those of [0, 1/2], `b` gets those
+// of [1/2, 1].
+template <class T>
+void halve_row(T* a, T* b, int degree, int stride) {
+  for (int i = 0; i <= degree; ++i) {
+    b[(degree - i) * stride] = a[degree * stride];
+    for (int k = degree; k > i; --k) a[k * stride] = 0.5 * (a[k * stride] + a[(k - 1) * stride]);
+  }
+}
+
+// The same along one parameter of a net of (degree_u + 1)(degree_v + 1) coefficients, v fastest.
+template <class T>
+void halve_net(T* a, T* b, int degree_u, int degree_v, bool in_u) {
+  const int row = degree_v + 1;
+  if (in_u)
+    for (int j = 0; j < row; ++j) halve_row(a + j, b + j, degree_u, row);
+  else
+    for (int i = 0; i <= degree_u; ++i) halve_row(a + i * row, b + i * row, degree_v, 1);
+}
+
+// On [0, 1/2] and [1/2, 1].
 template <class T>
 std::pair<Bernstein<T>, Bernstein<T>> halve(Bernstein<T> a) {
   Bernstein<T> b(a);
-  const int n = static_cast<int>(a.size()) - 1;
-  for (int i = 0; i <= n; ++i) {
-    b[n - i] = a[n];
-    for (int k = n; k > i; --k) a[k] = 0.5 * (a[k] + a[k - 1]);
-  }
+  halve_row(a.data(), b.data(), static_cast<int>(a.size()) - 1, 1);
   return {std::move(a), std::move(b)};
 }
 

@@ -10,6 +10,7 @@
 
 #include "body/support.h"
 #include "nurbs/affine.h"
+#include "nurbs/bernstein.h"
 #include "shapes/convex_fit.h"
 #include "shapes/primitives.h"
 
@@ -86,19 +87,9 @@ double control_distance(const BezierPatch& patch, const ConvexHull& hull, int& v
   return most;
 }
 
-// De Casteljau at 1/2 along one parameter.
 std::pair<BezierPatch, BezierPatch> halve(const BezierPatch& patch, bool in_u) {
   std::pair<BezierPatch, BezierPatch> out{patch, patch};
-  const int n = in_u ? patch.degree_u : patch.degree_v, lines = in_u ? patch.degree_v : patch.degree_u;
-  for (int line = 0; line <= lines; ++line) {
-    const auto at = [&](BezierPatch& p, int k) -> Vec4& {
-      return in_u ? p.point(k, line) : p.point(line, k);
-    };
-    for (int i = 0; i <= n; ++i) {
-      at(out.second, n - i) = at(out.first, n);
-      for (int k = n; k > i; --k) at(out.first, k) = 0.5 * (at(out.first, k) + at(out.first, k - 1));
-    }
-  }
+  halve_net(out.first.points.data(), out.second.points.data(), patch.degree_u, patch.degree_v, in_u);
   return out;
 }
 
