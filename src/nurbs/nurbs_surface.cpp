@@ -199,6 +199,23 @@ std::vector<BezierPiece> split_to_bezier(const NurbsSurface& surface) {
   return pieces;
 }
 
+NurbsSurface bezier_surface(int degree_u, int degree_v, std::vector<Vec4> points) {
+  const auto knots = [](int degree) {
+    std::vector<double> k(static_cast<size_t>(degree) + 1, 0.0);
+    k.insert(k.end(), k.size(), 1.0);
+    return k;
+  };
+  NurbsSurface s;
+  s.degree_u = degree_u;
+  s.degree_v = degree_v;
+  s.knots_u = knots(degree_u);
+  s.knots_v = knots(degree_v);
+  s.size_u = degree_u + 1;
+  s.size_v = degree_v + 1;
+  s.points = std::move(points);
+  return s;
+}
+
 NurbsSurface swap_uv(const NurbsSurface& s) {
   NurbsSurface out;
   out.degree_u = s.degree_v;

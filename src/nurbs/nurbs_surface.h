@@ -25,6 +25,9 @@ struct NurbsSurface {
 // empty when it can be evaluated. Checks degrees, counts, knots, weights and points, in that order.
 std::string find_defect(const NurbsSurface& surface);
 
+// A surface of one Bezier patch: homogeneous points, v fastest; knots 0 and 1.
+NurbsSurface bezier_surface(int degree_u, int degree_v, std::vector<Vec4> points);
+
 // Point at (u, v) of the surface's own knot domain [knots[degree], knots[size]], by de Boor's recurrence in
 // homogeneous coordinates (NURBS Book, section 4.4 and A5.2's triangular scheme); parameters outside are
 // clamped.

@@ -7,6 +7,7 @@
 
 #include "nurbs/affine.h"
 #include "shapes/cube_net.h"
+#include "shapes/revolved.h"
 #include "shapes/surface_fit.h"
 
 namespace nurbs {
@@ -83,25 +84,11 @@ std::vector<NurbsSurface> pebble() {
 }
 
 std::vector<NurbsSurface> revolved_ellipsoid(double equatorial, double polar) {
-  // Arcs of 90 degrees as rational quadratics: full circle and half circle (NURBS Book, example 7.2).
-  constexpr int kCircle[9][2] = {{1, 0},   {1, 1},  {0, 1},  {-1, 1}, {-1, 0},
-                                 {-1, -1}, {0, -1}, {1, -1}, {1, 0}};
-  constexpr int kMeridian[5][2] = {{0, -1}, {1, -1}, {1, 0}, {1, 1}, {0, 1}};
-  const auto weight = [](int k) { return k % 2 == 0 ? 1 : std::sqrt(0.5); };
-  NurbsSurface s;
-  s.degree_u = s.degree_v = 2;
-  s.knots_u = {0, 0, 0, 0.25, 0.25, 0.5, 0.5, 0.75, 0.75, 1, 1, 1};
-  s.knots_v = {0, 0, 0, 0.5, 0.5, 1, 1, 1};
-  s.size_u = 9;
-  s.size_v = 5;
-  for (int i = 0; i < s.size_u; ++i) {
-    for (int j = 0; j < s.size_v; ++j) {
-      const double radius = equatorial * kMeridian[j][0], w = weight(i) * weight(j);
-      s.points.push_back(w *
-                         Vec4(radius * kCircle[i][0], radius * kCircle[i][1], polar * kMeridian[j][1], 1));
-    }
-  }
-  return {s};
+  // A half circle as two rational quadratics (NURBS Book, example 7.2), stretched.
+  const double w = std::sqrt(0.5);
+  return {surface_of_revolution(
+      2, {0, 0, 0, 0.5, 0.5, 1, 1, 1},
+      {{0, -polar, 1}, {equatorial, -polar, w}, {equatorial, 0, 1}, {equatorial, polar, w}, {0, polar, 1}})};
 }
 
 std::vector<NurbsSurface> box(const Vec3& half_extents) {

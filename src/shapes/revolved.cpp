@@ -1,6 +1,7 @@
 // Profiles, their revolution, and rounded boxes.
 #include "shapes/revolved.h"
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 
@@ -21,25 +22,10 @@ ProfileArc arc(const Vec2& center, double radius, double a, double b) {
           std::cos(half)};
 }
 
-// Full circle as four rational quadratics (NURBS Book, example 7.2).
-constexpr int kCircle[9][2] = {{1, 0}, {1, 1}, {0, 1}, {-1, 1}, {-1, 0}, {-1, -1}, {0, -1}, {1, -1}, {1, 0}};
-
 NurbsSurface revolve(const ProfileArc& a) {
-  NurbsSurface s;
-  s.degree_u = 2;
-  s.degree_v = a.weight > 0 ? 2 : 1;
-  s.knots_u = {0, 0, 0, 0.25, 0.25, 0.5, 0.5, 0.75, 0.75, 1, 1, 1};
-  s.knots_v = a.weight > 0 ? std::vector<double>{0, 0, 0, 1, 1, 1} : std::vector<double>{0, 0, 1, 1};
-  s.size_u = 9;
-  s.size_v = s.degree_v + 1;
-  const Vec2 point[3] = {a.from, a.weight > 0 ? a.corner : a.to, a.to};
-  const double weight[3] = {1, a.weight > 0 ? a.weight : 1, 1};
-  for (int i = 0; i < s.size_u; ++i)
-    for (int j = 0; j < s.size_v; ++j) {
-      const double w = weight[j] * (i % 2 ? std::sqrt(0.5) : 1);
-      s.points.push_back(w * Vec4(point[j][0] * kCircle[i][0], point[j][0] * kCircle[i][1], point[j][1], 1));
-    }
-  return s;
+  const Vec3 from(a.from[0], a.from[1], 1), to(a.to[0], a.to[1], 1);
+  if (a.weight > 0) return surface_of_revolution({from, {a.corner[0], a.corner[1], a.weight}, to});
+  return surface_of_revolution({from, to});
 }
 
 // The profile below the equator, given from the pole outward, and its mirror image.
@@ -71,23 +57,12 @@ constexpr double kHalf = 0.70710678118654752;
 
 // Patch of degrees 1 or 2 from points and weights, v fastest.
 NurbsSurface patch(int p, int q, const std::vector<Vec3>& points, const std::vector<double>& weights) {
-  const auto knots = [](int degree) {
-    std::vector<double> k(degree + 1, 0.0);
-    k.insert(k.end(), degree + 1, 1.0);
-    return k;
-  };
-  NurbsSurface s;
-  s.degree_u = p;
-  s.degree_v = q;
-  s.knots_u = knots(p);
-  s.knots_v = knots(q);
-  s.size_u = p + 1;
-  s.size_v = q + 1;
+  std::vector<Vec4> net;
   for (size_t k = 0; k < points.size(); ++k) {
     const Vec3 x = weights[k] * points[k];
-    s.points.emplace_back(x[0], x[1], x[2], weights[k]);
+    net.emplace_back(x[0], x[1], x[2], weights[k]);
   }
-  return s;
+  return bezier_surface(p, q, std::move(net));
 }
 
 // A quarter cylinder between the faces of axes b and c (signs sb, sc), along axis a; a sphere's octant.
@@ -119,6 +94,32 @@ NurbsSurface octant(const Vec3& core, double r, const std::array<int, 3>& sign) 
 }
 
 }  // namespace
+
+NurbsSurface surface_of_revolution(int degree, const std::vector<double>& knots,
+                                   const std::vector<Vec3>& curve) {
+  constexpr int kCircle[9][2] = {{1, 0},   {1, 1},  {0, 1},  {-1, 1}, {-1, 0},
+                                 {-1, -1}, {0, -1}, {1, -1}, {1, 0}};
+  NurbsSurface s;
+  s.degree_u = 2;
+  s.degree_v = degree;
+  s.knots_u = {0, 0, 0, 0.25, 0.25, 0.5, 0.5, 0.75, 0.75, 1, 1, 1};
+  s.knots_v = knots;
+  s.size_u = 9;
+  s.size_v = static_cast<int>(curve.size());
+  for (int i = 0; i < s.size_u; ++i)
+    for (const Vec3& p : curve) {
+      const double w = p[2] * (i % 2 ? std::sqrt(0.5) : 1);
+      s.points.push_back(w * Vec4(p[0] * kCircle[i][0], p[0] * kCircle[i][1], p[1], 1));
+    }
+  return s;
+}
+
+NurbsSurface surface_of_revolution(const std::vector<Vec3>& segment) {
+  const size_t count = segment.size();
+  std::vector<double> knots(2 * count, 0);
+  std::fill_n(knots.begin() + static_cast<std::ptrdiff_t>(count), count, 1);
+  return surface_of_revolution(static_cast<int>(count) - 1, knots, segment);
+}
 
 std::vector<NurbsSurface> revolve(const Profile& profile) {
   std::vector<NurbsSurface> out;

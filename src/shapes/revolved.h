@@ -8,6 +8,14 @@
 
 namespace nurbs {
 
+// The NURBS curve of (r, z, weight), not homogeneous, turned about z: u runs round in four rational
+// quadratics (NURBS Book, section 8.5), v along the curve, which goes from the lower end of the axis up for
+// Su x Sv outward.
+NurbsSurface surface_of_revolution(int degree, const std::vector<double>& knots,
+                                   const std::vector<Vec3>& curve);
+// The same of one Bezier segment.
+NurbsSurface surface_of_revolution(const std::vector<Vec3>& segment);
+
 // A convex profile in the half plane (r, z), r >= 0, from the lower pole (0, z0) to the upper one: lines, and
 // arcs of conics as rational quadratics.
 struct ProfileArc {

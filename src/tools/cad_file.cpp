@@ -536,19 +536,8 @@ std::vector<NurbsSurface> faces_of(const Shape& shape) {
   if (std::all_of(shape.surfaces.begin(), shape.surfaces.end(), one_face)) return shape.surfaces;
   std::vector<NurbsSurface> out;
   for (const NurbsSurface& surface : shape.surfaces)
-    for (const BezierPiece& piece : split_to_bezier(surface)) {
-      NurbsSurface s;
-      s.degree_u = piece.patch.degree_u;
-      s.degree_v = piece.patch.degree_v;
-      s.size_u = s.degree_u + 1;
-      s.size_v = s.degree_v + 1;
-      s.knots_u.assign(static_cast<size_t>(s.size_u), 0);
-      s.knots_u.resize(2 * static_cast<size_t>(s.size_u), 1);
-      s.knots_v.assign(static_cast<size_t>(s.size_v), 0);
-      s.knots_v.resize(2 * static_cast<size_t>(s.size_v), 1);
-      s.points = piece.patch.points;
-      out.push_back(std::move(s));
-    }
+    for (const BezierPiece& piece : split_to_bezier(surface))
+      out.push_back(bezier_surface(piece.patch.degree_u, piece.patch.degree_v, piece.patch.points));
   return out;
 }
 

@@ -23,7 +23,7 @@ ShapePointer roller() {
   return s;
 }
 ShapePointer pill() {
-  static const ShapePointer s = make_shape("tablet", tablet(1, 0.3, 0.2));
+  static const ShapePointer s = make_shape("tablet", sharp_tablet(1, 0.3, 0.2));
   return s;
 }
 ShapePointer soap() {

@@ -130,7 +130,7 @@ TEST(FlatFaces, cylinder_has_octagons_on_its_rims_and_lines_on_its_side) {
 }
 
 TEST(FlatFaces, tablet_has_a_ruled_band) {
-  const ShapePointer s = make_shape("tablet", tablet(1, 0.3, 0.2));
+  const ShapePointer s = make_shape("tablet", sharp_tablet(1, 0.3, 0.2));
   EXPECT_TRUE(s->flats.faces.empty());
   EXPECT_TRUE(s->flats.edges.empty());
   ASSERT_FALSE(s->flats.ruling.empty());

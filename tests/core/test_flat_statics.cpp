@@ -228,7 +228,7 @@ ShapePointer soap() {
   return s;
 }
 ShapePointer pill() {
-  static const ShapePointer s = make_shape("pill", tablet(0.5, 0.3, 0.1));
+  static const ShapePointer s = make_shape("pill", sharp_tablet(0.5, 0.3, 0.1));
   return s;
 }
 

@@ -16,6 +16,7 @@
 #include "io/pair_case.h"
 #include "nurbs/tolerances.h"
 #include "shapes/primitives.h"
+#include "shapes/revolved.h"
 #include "support/bodies.h"
 #include "support/cases.h"
 #include "support/random.h"
@@ -38,25 +39,6 @@ Surfaces mismatched(Random& random, Surfaces body, double most) {
     reparametrise(s, u, v);
   }
   return body;
-}
-
-// A body of revolution as one patch, meridian (r, z) with weights.
-Surfaces revolve(const std::vector<Vec3>& meridian) {
-  constexpr int kCircle[9][2] = {{1, 0},   {1, 1},  {0, 1},  {-1, 1}, {-1, 0},
-                                 {-1, -1}, {0, -1}, {1, -1}, {1, 0}};
-  NurbsSurface s;
-  s.degree_u = 2;
-  s.degree_v = static_cast<int>(meridian.size()) - 1;
-  s.knots_u = {0, 0, 0, 0.25, 0.25, 0.5, 0.5, 0.75, 0.75, 1, 1, 1};
-  s.knots_v.assign(meridian.size(), 0);
-  s.knots_v.resize(2 * meridian.size(), 1);
-  s.size_u = 9;
-  s.size_v = static_cast<int>(meridian.size());
-  for (int i = 0; i < 9; ++i)
-    for (const Vec3& m : meridian)
-      s.points.push_back((i % 2 ? std::sqrt(0.5) : 1) * m[2] *
-                         Vec4(m[0] * kCircle[i][0], m[0] * kCircle[i][1], m[1], 1));
-  return {s};
 }
 
 // Largest |C(t, t, t)| at a point by finite differences of W along geodesics of the Gauss map: independent of
@@ -178,7 +160,7 @@ TEST(Radii, see_a_spike_between_all_samples) {
   // A lens whose rim lies in a thousandth of its patch's parameter. The truth is the same surface at even
   // parameters, looked at densely.
   for (const double ratio : {1.0, 30.0, 1000.0}) {
-    Surfaces body = revolve({{0, -0.6, 1}, {1, -0.6, 1}, {1, 0, 1}, {1, 0.6, 1}, {0, 0.6, 1}});
+    Surfaces body{surface_of_revolution({{0, -0.6, 1}, {1, -0.6, 1}, {1, 0, 1}, {1, 0.6, 1}, {0, 0.6, 1}})};
     const auto even = make_shape("even", body);
     double least = 1e300;
     for (const BezierPatch& patch : even->patches)

@@ -8,6 +8,7 @@
 #include "body/connectivity.h"
 #include "body/shape.h"
 #include "shapes/primitives.h"
+#include "shapes/revolved.h"
 #include "support/random.h"
 
 namespace nurbs {
@@ -87,23 +88,9 @@ void expect_consistent(const Shape& shape, double tolerance = 1e-12) {
 
 // Body of revolution about z from a Bezier meridian (r, z), as one patch with two poles and a seam.
 Surfaces revolve(const std::vector<Vec2>& meridian) {
-  constexpr int kCircle[9][2] = {{1, 0},   {1, 1},  {0, 1},  {-1, 1}, {-1, 0},
-                                 {-1, -1}, {0, -1}, {1, -1}, {1, 0}};
-  NurbsSurface s;
-  s.degree_u = 2;
-  s.degree_v = static_cast<int>(meridian.size()) - 1;
-  s.knots_u = {0, 0, 0, 0.25, 0.25, 0.5, 0.5, 0.75, 0.75, 1, 1, 1};
-  s.knots_v.assign(meridian.size(), 0);
-  s.knots_v.resize(2 * meridian.size(), 1);
-  s.size_u = 9;
-  s.size_v = static_cast<int>(meridian.size());
-  for (int i = 0; i < 9; ++i) {
-    const double w = i % 2 ? std::sqrt(0.5) : 1;
-    for (const Vec2& m : meridian) {
-      s.points.push_back(w * Vec4(m[0] * kCircle[i][0], m[0] * kCircle[i][1], m[1], 1));
-    }
-  }
-  return {s};
+  std::vector<Vec3> segment;
+  for (const Vec2& m : meridian) segment.emplace_back(m[0], m[1], 1);
+  return {surface_of_revolution(segment)};
 }
 
 // Meridian with a waist: r(s) = 4 a s + (6 b - 8 a) s^2 with s = t (1 - t), so for b < 0 the waist s = 1/4

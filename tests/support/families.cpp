@@ -11,6 +11,7 @@
 #include "contact/pair_search.h"
 #include "nurbs/tolerances.h"
 #include "shapes/primitives.h"
+#include "shapes/revolved.h"
 #include "support/ellipsoid_oracle.h"
 #include "support/pairs.h"
 #include "support/solid_families.h"
@@ -96,23 +97,14 @@ const Body& puck(double flatness) {
   Body& body = made[flatness];
   if (body.shape) return body;
   const double drop = 0.5 * flatness * kPuckCap * kPuckCap, top = kPuckHeight, round = std::sqrt(0.5);
-  // Radius, height, weight from the equator up.
   const double rim_slope = 2 * drop / kPuckCap, tangent = top - drop - rim_slope * (1 - kPuckCap);
-  const double half[5][3] = {
+  const Vec3 half[5] = {
       {1, 0, 1}, {1, tangent, round}, {kPuckCap, top - drop, 1}, {0.5 * kPuckCap, top, 1}, {0, top, 1}};
-  NurbsSurface s;
-  s.degree_u = s.degree_v = 2;
-  s.knots_u = {0, 0, 0, 0.25, 0.25, 0.5, 0.5, 0.75, 0.75, 1, 1, 1};
-  s.knots_v = s.knots_u;
-  s.size_u = s.size_v = 9;
-  const double circle[9][2] = {{1, 0}, {1, 1}, {0, 1}, {-1, 1}, {-1, 0}, {-1, -1}, {0, -1}, {1, -1}, {1, 0}};
-  for (int i = 0; i < 9; ++i)
-    for (int j = 0; j < 9; ++j) {
-      const double* p = half[j < 4 ? 4 - j : j - 4];
-      const double z = j < 4 ? -p[1] : p[1], w = p[2] * (i % 2 ? round : 1);
-      s.points.push_back(w * Vec4(p[0] * circle[i][0], p[0] * circle[i][1], z, 1));
-    }
-  return body = make_body("puck", {s});
+  std::vector<Vec3> curve;  // from the lower pole up
+  for (int j = 4; j > 0; --j) curve.emplace_back(half[j][0], -half[j][1], half[j][2]);
+  curve.insert(curve.end(), half, half + 5);
+  return body = make_body(
+             "puck", {surface_of_revolution(2, {0, 0, 0, 0.25, 0.25, 0.5, 0.5, 0.75, 0.75, 1, 1, 1}, curve)});
 }
 
 // --- placing

@@ -2,10 +2,10 @@
 #include "support/solids.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 
 #include "shapes/primitives.h"
+#include "shapes/revolved.h"
 
 namespace nurbs::test {
 namespace {
@@ -26,28 +26,15 @@ Solid finish(Random& random, const std::string& name, std::vector<NurbsSurface> 
 }
 
 // One point of a profile: radius, height, weight.
-using Profile = std::vector<std::array<double, 3>>;
+using Profile = std::vector<Vec3>;
 
 // Full turn of a profile of Bezier pieces of `degree` about z, bottom to top.
 NurbsSurface revolve(const Profile& profile, int degree) {
-  const double round = std::sqrt(0.5);
-  const double circle[9][2] = {{1, 0}, {1, 1}, {0, 1}, {-1, 1}, {-1, 0}, {-1, -1}, {0, -1}, {1, -1}, {1, 0}};
-  NurbsSurface s;
-  s.degree_u = 2;
-  s.degree_v = degree;
-  s.size_u = 9;
-  s.size_v = static_cast<int>(profile.size());
-  s.knots_u = {0, 0, 0, 0.25, 0.25, 0.5, 0.5, 0.75, 0.75, 1, 1, 1};
-  const int pieces = (s.size_v - 1) / degree;
-  s.knots_v.push_back(0);
-  for (int k = 0; k <= pieces; ++k) s.knots_v.insert(s.knots_v.end(), degree, double(k) / pieces);
-  s.knots_v.push_back(1);
-  for (int i = 0; i < 9; ++i)
-    for (const auto& [r, z, w] : profile) {
-      const double weight = w * (i % 2 ? round : 1);
-      s.points.push_back(weight * Vec4(r * circle[i][0], r * circle[i][1], z, 1));
-    }
-  return s;
+  const int pieces = (static_cast<int>(profile.size()) - 1) / degree;
+  std::vector<double> knots{0};
+  for (int k = 0; k <= pieces; ++k) knots.insert(knots.end(), degree, double(k) / pieces);
+  knots.push_back(1);
+  return surface_of_revolution(degree, knots, profile);
 }
 
 // Any weights leave straight lines where they are.
