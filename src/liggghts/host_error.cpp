@@ -39,13 +39,6 @@ void warn_news(const char* file, int line, LAMMPS* lmp, const std::string& messa
   last = message;
 }
 
-const char* fix_style_with(const LAMMPS* lmp, const char* prefix) {
-  for (int k = 0; k < lmp->modify->nfix; ++k)
-    if (std::strncmp(lmp->modify->fix[k]->style, prefix, std::strlen(prefix)) == 0)
-      return lmp->modify->fix[k]->style;
-  return nullptr;
-}
-
 std::string show(double value) {
   char text[32];
   std::snprintf(text, sizeof text, "%.10g", value);

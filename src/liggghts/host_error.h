@@ -21,9 +21,6 @@ void warn(const char* file, int line, LAMMPS* lmp, const std::string& message);
 // The same unless `last` is that message already; keeps it there.
 void warn_news(const char* file, int line, LAMMPS* lmp, const std::string& message, std::string& last);
 
-// Style of the first fix whose style begins with `prefix`; nullptr if there is none.
-const char* fix_style_with(const LAMMPS* lmp, const char* prefix);
-
 // A number as a message shows it: shortest form that tells the value.
 std::string show(double value);
 

@@ -33,17 +33,6 @@ namespace {
 constexpr const char* kUser = "Pair gran/nurbs";
 constexpr double kMinTolerance = 1e-15, kMaxTolerance = 0.1;
 
-// Host styles that take the particles for spheres or want another pair style's data, and what to use instead.
-struct Refused {
-  const char* prefix;
-  const char* instead;
-};
-constexpr Refused kRefused[] = {{"wall/gran", "; use fix wall/nurbs"},
-                                {"heat/gran", ""},
-                                {"multicontact", ""},
-                                {"rigid", "; use fix nve/nurbs"},
-                                {"multisphere", "; use fix nve/nurbs"}};
-
 }  // namespace
 
 PairGranNurbs::PairGranNurbs(LAMMPS* lmp) : PairGran(lmp) {
@@ -136,11 +125,7 @@ void PairGranNurbs::require_host_settings() {
   if (!comm->ghost_velocity) fail_all(FLERR, lmp, std::string(kUser) + " needs 'communicate single vel yes'");
 }
 
-void PairGranNurbs::refuse_sphere_features() {
-  for (const Refused& refused : kRefused)
-    if (const char* style = nurbs_host::fix_style_with(lmp, refused.prefix))
-      fail_all(FLERR, lmp,
-               std::string("Fix ") + style + " can't be used with pair_style gran/nurbs" + refused.instead);
+void PairGranNurbs::warn_of_sphere_values() {
   ComputePairGranLocal* local = cpl();
   if (local == nullptr) return;
   if (local->offset_fn() >= 0 || local->offset_ft() >= 0 || local->offset_torquen() >= 0 ||
@@ -170,7 +155,7 @@ void PairGranNurbs::init_style() {
   bodies_ = AtomVecNurbs::require(lmp, kUser);
   require_host_settings();
   require_all_laws();
-  refuse_sphere_features();
+  warn_of_sphere_values();
   PairGran::init_style();
   if (dynamic_cast<FixContactHistoryNurbs*>(fix_history) == nullptr)
     fail_all(FLERR, lmp, "Pair gran/nurbs: fix contacthistory is not the NURBS one");

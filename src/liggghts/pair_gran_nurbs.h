@@ -82,7 +82,7 @@ class PairGranNurbs : public PairGran {
   void set_models(std::unique_ptr<nurbs_host::HostModels> models);
   void allocate_laws();
   void require_host_settings();
-  void refuse_sphere_features();
+  void warn_of_sphere_values();
   void require_all_laws();
   void warn_short_box();
   void warn_time_step();
