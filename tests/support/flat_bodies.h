@@ -35,7 +35,8 @@ inline std::vector<NurbsSurface> rounded_cylinder(double radius, double half_hei
                                  {0, h, 1}})};
 }
 
-// A tablet with sharp rims: a band of the given radius and half height between two spherical caps of height `cap`.
+// A tablet with sharp rims: a band of the given radius and half height between two spherical caps of height
+// `cap`.
 inline std::vector<NurbsSurface> sharp_tablet(double radius, double half_height, double cap) {
   const double sphere = (radius * radius + cap * cap) / (2 * cap);
   const double half_angle = 0.5 * std::asin(radius / sphere);
