@@ -1,19 +1,13 @@
 #!/usr/bin/python3
 """Writes drum.stl, a tube about y: drum.py RADIUS LENGTH, in metres."""
+import pathlib
 import sys
 
 import numpy as np
 
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1] / "common"))
+import stl  # noqa: E402
+
 radius, length = map(float, sys.argv[1:])
-turn = np.linspace(0, 2 * np.pi, 61)
-rim = np.stack([radius * np.cos(turn), 0 * turn, radius * np.sin(turn)], axis=1)
-low, high = rim - [0, length / 2, 0], rim + [0, length / 2, 0]
-with open("drum.stl", "w") as f:
-    print("solid", file=f)
-    for k in range(len(turn) - 1):
-        for corners in ((low[k], low[k + 1], high[k + 1]), (low[k], high[k + 1], high[k])):
-            print("facet normal 0 0 0\nouter loop", file=f)
-            for corner in corners:
-                print("vertex", *(f"{c:.9g}" for c in corner), file=f)
-            print("endloop\nendfacet", file=f)
-    print("endsolid", file=f)
+rim, half = radius * stl.circle(60, axis=1), np.array([0, length / 2, 0])
+stl.write("drum.stl", [rim - half, rim + half])

@@ -3,10 +3,7 @@
 import pathlib
 import sys
 
-sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1]))
-from draw_bed import draw  # noqa: E402
-
-import numpy as np  # noqa: E402
+import numpy as np
 
 RADIUS = 0.04
 
@@ -40,4 +37,8 @@ def main(folder):
          towards=(0, -1, 0), walls=[folder / show / "drum.stl"], zoom=1.4)
 
 
-main(pathlib.Path(sys.argv[1]))
+if __name__ == "__main__":
+    sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1] / "common"))
+    from draw import draw  # starts again under a virtual screen where there is none
+
+    main(pathlib.Path(sys.argv[1]))

@@ -3,25 +3,21 @@
 import pathlib
 import sys
 
-sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1]))
-from draw_bed import draw  # noqa: E402
-
-import matplotlib  # noqa: E402
-import numpy as np  # noqa: E402
+import matplotlib
+import numpy as np
 
 matplotlib.use("Agg")
-import matplotlib.pyplot as plt  # noqa: E402
+import matplotlib.pyplot as plt
 
 VOLUME, HOLE, DENSITY, G = 4 / 3 * np.pi * 3e-3**3, 0.03, 2500.0, 9.81
-OPENED, DT = 8000, 1e-4  # step, s
 ASPECT = {"flat": 0.6, "sphere": 1.0, "long": 1.5, "needle": 2.5}
 STEADY = 0.2  # s, until the flow is
 
 
 def discharge(folder):
     """Time since the lid is gone, and the grains that are left."""
-    step, left = np.loadtxt(folder / "discharge.txt", unpack=True)
-    return (step - OPENED) * DT, left
+    _, t, left = np.loadtxt(folder / "discharge.txt", unpack=True)
+    return t - t[0], left
 
 
 def rate(folder):
@@ -65,4 +61,8 @@ def main(folder):
          walls=[folder / show / "silo.stl"], zoom=1.5)
 
 
-main(pathlib.Path(sys.argv[1]))
+if __name__ == "__main__":
+    sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1] / "common"))
+    from draw import draw  # starts again under a virtual screen where there is none
+
+    main(pathlib.Path(sys.argv[1]))

@@ -4,10 +4,7 @@ import pathlib
 import re
 import sys
 
-sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1]))
-from draw_bed import draw  # noqa: E402
-
-import numpy as np  # noqa: E402
+import numpy as np
 
 
 def last(log):
@@ -32,4 +29,8 @@ def main(folder):
     draw(next(folder.glob("ellipsoid-*/packing-*.vtu")), folder / "packing.png", towards=(0.6, -1, 0.6))
 
 
-main(pathlib.Path(sys.argv[1]))
+if __name__ == "__main__":
+    sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1] / "common"))
+    from draw import draw  # starts again under a virtual screen where there is none
+
+    main(pathlib.Path(sys.argv[1]))

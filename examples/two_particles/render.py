@@ -4,56 +4,25 @@
 Usage: render.py [FOLDER]     reads FOLDER/figure-*.vtu, writes FOLDER/scene.png
 """
 
-import os
 import pathlib
 import sys
 
-if not os.environ.get("DISPLAY"):  # Debian's VTK draws through X; a virtual screen will do
-    os.execvp("xvfb-run", ["xvfb-run", "-a", "-s", "-screen 0 1600x1200x24", sys.executable, *sys.argv])
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1] / "common"))
+from draw import actor, grab, surface_of  # noqa: E402  (first: starts again under a virtual screen where there is none)
+from nurbs_vtu import read_grid, read_patches, read_time  # noqa: E402
 
-import matplotlib
-import numpy as np
-import vtk
-from vtk.util.numpy_support import numpy_to_vtk, vtk_to_numpy
+import matplotlib  # noqa: E402
+import numpy as np  # noqa: E402
+import vtk  # noqa: E402
 
 matplotlib.use("Agg")
-import matplotlib.pyplot as plt
-
-from nurbs_vtu import read_grid, read_patches, read_time
+import matplotlib.pyplot as plt  # noqa: E402
 
 TIMES = (0, 0.065, 0.07963, 0.21769)
-COLORS = {1: (0.84, 0.49, 0.26), 2: (0.33, 0.53, 0.72)}
+COLORS = 255 * np.array([(0.84, 0.49, 0.26), (0.33, 0.53, 0.72)])
 FLOOR = 0.2
 SIZE = (900, 900)
-
-
-def surface_of(patches, samples=40):
-    """The patches as one mesh of triangles with exact normals, coloured by body."""
-    t = np.linspace(0, 1, samples)
-    points, normals, colors, quads = [], [], [], []
-    grid = np.arange(samples * samples).reshape(samples, samples)
-    corners = np.stack([grid[:-1, :-1], grid[1:, :-1], grid[1:, 1:], grid[:-1, 1:]], axis=-1).reshape(-1, 4)
-    for k, patch in enumerate(patches):
-        x, n = patch.evaluate(t, t)
-        points.append(x.reshape(-1, 3))
-        normals.append(n.reshape(-1, 3))
-        color = np.array(COLORS[(int(patch.data["id"][0]) - 1) % len(COLORS) + 1])
-        colors.append(np.tile(color * 255, (samples**2, 1)))
-        quads.append(corners + k * samples**2)
-    return mesh(np.vstack(points), np.vstack(quads), np.vstack(normals), np.vstack(colors))
-
-
-def mesh(points, faces, normals, colors):
-    data = vtk.vtkPolyData()
-    data.SetPoints(vtk.vtkPoints())
-    data.GetPoints().SetData(numpy_to_vtk(points, deep=True))
-    cells = vtk.vtkCellArray()
-    rows = np.hstack([np.full((len(faces), 1), faces.shape[1]), faces]).ravel()
-    cells.ImportLegacyFormat(numpy_to_vtk(rows, deep=True, array_type=vtk.VTK_ID_TYPE))
-    data.SetPolys(cells)
-    data.GetPointData().SetNormals(numpy_to_vtk(normals, deep=True))
-    data.GetPointData().SetScalars(numpy_to_vtk(colors.astype(np.uint8), deep=True))
-    return data
+LOOK = {"diffuse": 0.85, "power": 35}
 
 
 def seams_of(patches, samples=60, lift=1.5e-5):
@@ -86,23 +55,6 @@ def floor_around(center, size=2.4):
     plane.SetResolution(100, 100)
     plane.Update()
     return plane.GetOutput()
-
-
-def actor(data, color=None, specular=0.0, ambient=0.1):
-    mapper = vtk.vtkPolyDataMapper()
-    mapper.SetInputData(data)
-    mapper.SetScalarVisibility(color is None)
-    shown = vtk.vtkActor()
-    shown.SetMapper(mapper)
-    look = shown.GetProperty()
-    look.SetInterpolationToPhong()
-    look.SetAmbient(ambient)
-    look.SetDiffuse(0.85)
-    look.SetSpecular(specular)
-    look.SetSpecularPower(35)
-    if color is not None:
-        look.SetColor(*color)
-    return shown
 
 
 def spot(position, focus, intensity, cone=40):
@@ -144,9 +96,9 @@ def picture(patches, focus):
     renderer = vtk.vtkRenderer()
     renderer.SetBackground(1, 1, 1)
     renderer.SetAutomaticLightCreation(False)
-    renderer.AddActor(actor(surface_of(patches), specular=0.3, ambient=0.2))
-    renderer.AddActor(actor(seams_of(patches), color=(0.15, 0.15, 0.17), ambient=0.3))
-    renderer.AddActor(actor(floor_around(focus), color=(0.96, 0.96, 0.95), ambient=0.42))
+    renderer.AddActor(actor(surface_of(patches, 40, COLORS), **LOOK, specular=0.3, ambient=0.2))
+    renderer.AddActor(actor(seams_of(patches), color=(0.15, 0.15, 0.17), **LOOK, ambient=0.3, specular=0))
+    renderer.AddActor(actor(floor_around(focus), color=(0.96, 0.96, 0.95), **LOOK, ambient=0.42, specular=0))
     renderer.AddLight(spot(focus + (0.35, -0.5, 1.1), focus, 0.6))
     renderer.AddLight(spot(focus + (-0.7, -0.6, 0.9), focus, 0.22))
     renderer.AddLight(fill((-0.3, -1, -0.35), 0.2))
@@ -157,23 +109,7 @@ def picture(patches, focus):
     camera.SetViewUp(0, 0, 1)
     camera.SetViewAngle(26)
     renderer.ResetCameraClippingRange()
-    return grab(renderer)
-
-
-def grab(renderer):
-    window = vtk.vtkRenderWindow()
-    window.SetOffScreenRendering(True)
-    window.SetMultiSamples(0)
-    window.SetSize(*SIZE)
-    window.AddRenderer(renderer)
-    window.Render()
-    image = vtk.vtkWindowToImageFilter()
-    image.SetInput(window)
-    image.ReadFrontBufferOff()
-    image.Update()
-    output = image.GetOutput()
-    width, height, _ = output.GetDimensions()
-    return vtk_to_numpy(output.GetPointData().GetScalars()).reshape(height, width, -1)[::-1]
+    return grab(renderer, SIZE, samples=0)
 
 
 def snapshot_at(grids, time):

@@ -8,6 +8,7 @@
 import json
 import os
 import pathlib
+import re
 import shutil
 import subprocess
 import tempfile
@@ -113,6 +114,17 @@ def dump_frames(text):
                 rows = rows[np.argsort(rows[:, names.index("id")])]
             frames.append((step, dict(zip(names, rows.T))))
     return frames
+
+
+def example(name, changes=(), time=1.0, steps=1.0):
+    """Text of an example's deck, its time step times `time`, its runs as many steps times `steps`; `changes`: (old, new)."""
+    text = (ROOT / "examples" / name / f"in.{name}").read_text()
+    for old, new in changes:
+        if old not in text:
+            raise AssertionError(f"{name}: no {old!r}")
+        text = text.replace(old, new)
+    text = re.sub(r"^(timestep +)(\S+)", lambda m: f"{m[1]}{float(m[2]) * time:g}", text, flags=re.M)
+    return re.sub(r"^(run +)(\d+)", lambda m: f"{m[1]}{round(int(m[2]) * steps)}", text, flags=re.M)
 
 
 def box_shape(a, b, c, gyration=None):

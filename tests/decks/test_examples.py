@@ -12,16 +12,6 @@ import deck  # noqa: E402
 EXAMPLES = deck.ROOT / "examples"
 
 
-def short(name, changes):
-    """The deck with fewer steps and grains."""
-    text = (EXAMPLES / name / f"in.{name}").read_text()
-    for old, new in changes:
-        if old not in text:
-            raise AssertionError(f"{name}: no {old!r}")
-        text = text.replace(old, new)
-    return text
-
-
 def stl(script, *arguments):
     """Files that a script of an example writes."""
     place = deck.BUILD / "test-examples"
@@ -43,14 +33,14 @@ class Examples(unittest.TestCase):
             self.assertLessEqual(sum(1 for line in lines if line.strip()), 40, name)
 
     def test_packing(self):
-        text = short("packing", [("run          500 ", "run          20 "), ("< 5e3", "< -1e9"), ("> 50", "> 1e9"),
+        text = deck.example("packing", [("run          500 ", "run          20 "), ("< 5e3", "< -1e9"), ("> 50", "> 1e9"),
                                  ("volumefraction_region 0.25", "volumefraction_region 0.1")])
         result = self.run_both(text, {"ellipsoid.json": deck.shape_file("ellipsoid", 1.25, 1, 0.8)})
         self.assertAlmostEqual(result.thermo["fraction"][-1], 0.1, delta=5e-3)
 
     def test_hopper(self):
         place = stl("hopper/silo.py", "0.03", "0.015", "0.32")
-        text = short("hopper", [("particles_in_region 1600", "particles_in_region 60"), ("run          8000", "run          300"),
+        text = deck.example("hopper", [("particles_in_region 1600", "particles_in_region 60"), ("run          8000", "run          300"),
                                 ("run          12000", "run          300")])
         result = self.run_both(text, {"ellipsoid.json": deck.shape_file("ellipsoid", 1, 0.8, 1.2),
                                       "silo.stl": place / "silo.stl", "lid.stl": place / "lid.stl"})
@@ -58,7 +48,7 @@ class Examples(unittest.TestCase):
 
     def test_drum(self):
         place = stl("drum/drum.py", "0.04", "0.04")
-        text = short("drum", [("particles_in_region 400", "particles_in_region 60"), ("run          4000", "run          300"),
+        text = deck.example("drum", [("particles_in_region 400", "particles_in_region 60"), ("run          4000", "run          300"),
                               ("run          10000", "run          300"), ("run          20000", "run          300")])
         result = self.run_both(text, {"ellipsoid.json": deck.shape_file("ellipsoid", 1, 0.8, 1.2), "drum.stl": place / "drum.stl"})
         self.assertEqual(result.thermo["Atoms"][-1], 60)

@@ -12,7 +12,7 @@ import vtk
 
 import deck
 
-sys.path.insert(0, str(deck.ROOT / "examples" / "two_particles"))
+sys.path.insert(0, str(deck.ROOT / "examples" / "common"))
 from nurbs_vtu import read_grid, read_patches, read_time  # noqa: E402
 
 AXES = np.array([1.0, 1.5, 0.7])
