@@ -9,8 +9,9 @@
 namespace nurbs {
 namespace {
 
-constexpr int kDirections = 8;    // around the axis, where maxima are looked for first ...
-constexpr double kFinest = 2e-3;  // rad, and where there may be some
+constexpr double kCoarsest = M_PI / 4;  // rad, between directions where maxima are looked for first ...
+constexpr double kFinest = 2e-3;        // and where there may be some,
+constexpr double kNearest = 0.02;       // or this far apart on the wall, in sizes of the body
 
 SurfaceContact surface_contact(const FeatureContact& f) {
   SurfaceContact c;
@@ -45,11 +46,12 @@ class Tube {
         apart_(particle.x - origin) {}
 
   Vec3 direction(double angle) const { return std::cos(angle) * u_ + std::sin(angle) * v_; }
-  Reach look(double angle) const {
+  // `start`: where the search begins.
+  Reach look(double angle, const Reach* start = nullptr) const {
     Reach r;
     r.angle = angle;
     const Vec3 d = direction(angle);
-    const FeatureGap g = gap_along(particle_, Vec3::Zero(), -d, nullptr);
+    const FeatureGap g = gap_along(particle_, Vec3::Zero(), -d, start ? &start->where : nullptr);
     r.on_body = g.on_body;
     r.where = g.where;
     const Vec3 x = apart_ + r.on_body;
@@ -66,7 +68,7 @@ class Tube {
       const double l = weight_low * low.slope, h = weight_high * high.slope;
       const double t = k % 4 == 3 ? 0.5 : std::clamp(l / (l - h), 1e-7, 1 - 1e-7);
       const double angle = low.angle + t * (high.angle - low.angle);
-      const Reach next = look(angle);
+      const Reach next = look(angle, t < 0.5 ? &low : &high);
       const double moved = std::min(angle - low.angle, high.angle - angle);
       if (next.slope > 0) {
         weight_high = raised == 1 ? 0.5 * weight_high : 1;
@@ -94,22 +96,34 @@ class Tube {
   const Vec3 u_, v_, apart_;
 };
 
-// Directions from low to high angle, closer together where F may exceed the radius.
+// Directions in the order of their angles, closer together where F may exceed the radius.
 struct Samples {
   static constexpr int kMost = 512;
   Reach at[kMost];
   int count = 0;
+  double bound = 0;  // F is nowhere larger
 };
 
-void sample(Tube& tube, const Reach& low, const Reach& high, double lever, double radius, Samples* samples) {
-  const double width = high.angle - low.angle;
-  const bool may = std::max(low.value, high.value) + 0.5 * lever * width > radius;
-  if (may && width > kFinest && samples->count < Samples::kMost - 2) {
-    const Reach middle = tube.look(0.5 * (low.angle + high.angle));
-    sample(tube, low, middle, lever, radius, samples);
-    sample(tube, middle, high, lever, radius, samples);
+// F is at most this between two directions less than pi apart: the support lines' corner, as F is sublinear.
+double most_between(const Reach& low, const Reach& high) {
+  const double c = std::cos(high.angle - low.angle), s = std::sin(high.angle - low.angle), l = low.value,
+               h = high.value, ends = std::max(l, h);
+  return h > c * l && l > c * h ? std::max(ends, std::sqrt(l * l + h * h - 2 * l * h * c) / s) : ends;
+}
+
+// Where F stays below the radius, half of its distance from it is to be known.
+void sample(const Tube& tube, const Reach& low, const Reach& high, double radius, double finest,
+            Samples* samples) {
+  const double width = high.angle - low.angle, ends = std::max(low.value, high.value),
+               most = most_between(low, high) * (1 + 1e-12);
+  const bool may = most > std::min(radius, 0.5 * (radius + ends));
+  if (may && width > finest && samples->count < Samples::kMost - 32) {
+    const Reach middle = tube.look(0.5 * (low.angle + high.angle), low.value > high.value ? &low : &high);
+    sample(tube, low, middle, radius, finest, samples);
+    sample(tube, middle, high, radius, finest, samples);
     return;
   }
+  samples->bound = std::max(samples->bound, most);
   samples->at[samples->count++] = high;
 }
 
@@ -124,39 +138,50 @@ void add_inside(const Tube& tube, const Reach& top, double radius, SurfaceContac
   out->add(surface_contact(f));
 }
 
-void find_inside(const Particle& particle, const Vec3& origin, const Vec3& axis, double radius,
-                 SurfaceContacts* out) {
+// Returns what F is nowhere larger than, or infinity.
+double find_inside(const Particle& particle, const Vec3& origin, const Vec3& axis, double radius,
+                   SurfaceContacts* out) {
   const Vec3 apart = particle.x - origin, across = apart - apart.dot(axis) * axis;
   const double size = particle.scale * particle.shape->bounding_radius, distance = across.norm();
-  Tube tube(particle, origin, axis, across);
+  const Tube tube(particle, origin, axis, across);
   // F'' = (curvature radius of the body's outline) - F: where the body is everywhere more curved than the
   // tube, F has one maximum above the radius, if any.
-  if (!particle.shape->dented() && distance > 0 &&
-      particle.scale * particle.shape->patch_curvature.max_radius < radius) {
+  const double flattest = particle.scale * particle.shape->patch_curvature.max_radius;
+  if (!particle.shape->dented() && distance > 0 && flattest < radius) {
     const Reach ahead = tube.look(0);
     Reach other = ahead;
     const double side = ahead.slope > 0 ? 1 : -1;
-    for (double turn = 0.05; turn < 1.6 && other.slope * side > 0; turn *= 2) other = tube.look(side * turn);
-    if (other.slope * side > 0 || ahead.slope == 0) {
-      if (ahead.slope == 0) add_inside(tube, ahead, radius, out);
-      return;
-    }
-    add_inside(tube, side > 0 ? tube.top(ahead, other) : tube.top(other, ahead), radius, out);
-    return;
+    for (double turn = 0.05; turn < 1.6 && other.slope * side > 0; turn *= 2)
+      other = tube.look(side * turn, &other);
+    if (other.slope * side > 0) return HUGE_VAL;
+    const Reach top = ahead.slope == 0 ? ahead : side > 0 ? tube.top(ahead, other) : tube.top(other, ahead);
+    add_inside(tube, top, radius, out);
+    return std::max(top.value * (1 + 1e-9), flattest);
   }
+  // F < distance cos(angle) + size: elsewhere it stays below `level`.
+  const Reach ahead = tube.look(0);
+  const double level = std::min(radius, 0.5 * (radius + ahead.value));
+  const double reach = level - size > -distance ? std::acos(std::min((level - size) / distance, 1.0)) : M_PI;
+  const int parts = static_cast<int>(std::ceil(2 * reach / kCoarsest));
+  const double finest = std::max(kFinest, kNearest * size / radius);
   static thread_local Samples samples;
   samples.count = 0;
-  Reach low = tube.look(0);
+  samples.bound = level;
+  Reach low = tube.look(-reach, &ahead);
   samples.at[samples.count++] = low;
-  for (int k = 1; k <= kDirections; ++k) {
-    const Reach high = tube.look(k * 2 * M_PI / kDirections);
-    sample(tube, low, high, distance + size, radius, &samples);
+  Reach last = low;  // all around: the same direction, with the same slope
+  last.angle = reach;
+  for (int k = 1; k <= parts; ++k) {
+    const Reach high = k == parts && reach == M_PI ? last : tube.look((2.0 * k / parts - 1) * reach, &low);
+    sample(tube, low, high, radius, finest, &samples);
     low = high;
   }
   for (int k = 1; k < samples.count; ++k) {
     const Reach &from = samples.at[k - 1], &to = samples.at[k];
-    if (from.slope > 0 && to.slope <= 0) add_inside(tube, tube.top(from, to), radius, out);
+    if (from.slope > 0 && to.slope <= 0 && most_between(from, to) > radius)
+      add_inside(tube, tube.top(from, to), radius, out);
   }
+  return samples.bound;
 }
 
 void find_outside(const Particle& particle, const Vec3& origin, const Vec3& axis, double radius,
@@ -193,10 +218,12 @@ void find_cylinder_contacts(const Particle& particle, const Vec3& origin, const 
     out->expiry = path + (1 - 1e-12) * clear;
     return;
   }
-  if (distance < radius)
-    find_inside(particle, origin, axis, radius, out);
-  else
+  if (distance < radius) {
+    const double most = find_inside(particle, origin, axis, radius, out);
+    if (out->count == 0 && most < radius) out->expiry = path + (1 - 1e-12) * (radius - most);
+  } else {
     find_outside(particle, origin, axis, radius, out);
+  }
 }
 
 }  // namespace nurbs

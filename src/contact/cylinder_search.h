@@ -11,9 +11,10 @@
 
 namespace nurbs {
 
-// The body is inside when its centre of mass is. Normals point to the body. `path`: see surface_search.h. One
-// search of 4 to 6 supports; some tens inside a tube whose radius is less than one of the body's radii of
-// curvature, or where it has flats: maxima closer than 2e-3 rad are then found as one.
+// The body is inside when its centre of mass is. Normals point to the body. `path`: see surface_search.h;
+// without a contact, `expiry` says how far the body is from one. One search of 4 to 6 supports; some tens
+// inside a tube whose radius is less than one of the body's radii of curvature, or where it has flats: maxima
+// closer than 2e-3 rad, or than a fiftieth of the body on the wall, are then found as one.
 void find_cylinder_contacts(const Particle& particle, const Vec3& origin, const Vec3& axis, double radius,
                             double path, SurfaceContacts* out);
 
