@@ -124,7 +124,7 @@ def example(name, changes=(), time=1.0, steps=1.0):
             raise AssertionError(f"{name}: no {old!r}")
         text = text.replace(old, new)
     text = re.sub(r"^(timestep +)(\S+)", lambda m: f"{m[1]}{float(m[2]) * time:g}", text, flags=re.M)
-    return re.sub(r"^(run +)(\d+)", lambda m: f"{m[1]}{round(int(m[2]) * steps)}", text, flags=re.M)
+    return re.sub(r"^(run +)(\d+)", lambda m: f"{m[1]}{max(1, round(int(m[2]) * steps))}", text, flags=re.M)
 
 
 def box_shape(a, b, c, gyration=None):
