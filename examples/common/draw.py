@@ -21,7 +21,7 @@ COLORS = np.array([(214, 125, 66), (84, 135, 184), (222, 184, 96), (120, 160, 11
 
 def surface_of(patches, samples=9, colors=COLORS):
     """All patches as one mesh with exact normals, `samples` points a side; a body's colour goes by its id, from 1."""
-    t = np.linspace(0, 1, samples)
+    t = np.linspace(1e-6, 1 - 1e-6, samples)  # normals vanish where an edge has collapsed to a point
     grid = np.arange(samples**2).reshape(samples, samples)
     corners = np.stack([grid[:-1, :-1], grid[1:, :-1], grid[1:, 1:], grid[:-1, 1:]], axis=-1).reshape(-1, 4)
     points, normals, shades, quads = [], [], [], []

@@ -6,6 +6,8 @@ import sys
 import unittest
 from pathlib import Path
 
+import numpy as np
+
 sys.path.insert(0, str(Path(__file__).resolve().parent))
 import deck  # noqa: E402
 
@@ -28,7 +30,7 @@ class Examples(unittest.TestCase):
         return result
 
     def test_at_most_forty_lines(self):
-        for name in ("packing", "hopper", "drum"):
+        for name in ("packing", "hopper", "drum", "repose", "press"):
             lines = (EXAMPLES / name / f"in.{name}").read_text().splitlines()
             self.assertLessEqual(sum(1 for line in lines if line.strip()), 40, name)
 
@@ -52,6 +54,23 @@ class Examples(unittest.TestCase):
                               ("run          10000", "run          300"), ("run          20000", "run          300")])
         result = self.run_both(text, {"ellipsoid.json": deck.shape_file("ellipsoid", 1, 0.8, 1.2), "drum.stl": place / "drum.stl"})
         self.assertEqual(result.thermo["Atoms"][-1], 60)
+
+    def test_repose(self):
+        place = stl("repose/floor.py", "0.06", "0.024", "0.003")
+        text = deck.example("repose", [("particles_in_region 350", "particles_in_region 60")], steps=0.05)
+        result = self.run_both(text, {"pebble.json": deck.shape_file("pebble"), "floor.stl": place / "floor.stl"})
+        self.assertEqual(result.tables[0]["Atoms"][-1], 60)
+
+    def test_press(self):
+        text = deck.example("press", [("particles_in_region 200", "particles_in_region 20"), ("0.0001 0.13 ", "0.0001 0.03 ")], steps=0.25)
+        text = text.replace("$(c_top+5e-3)", "$(c_top+4.5e-3)")
+        shapes = {"tablet.json": deck.shape_file("tablet", radius=1, height=0.8, rim=0.15),
+                  "capsule.json": deck.shape_file("capsule", radius=0.6, length=1.2), "pebble.json": deck.shape_file("pebble")}
+        result = self.run_both(text, shapes)
+        self.assertEqual(result.thermo["Atoms"][-1], 20)
+        force = np.loadtxt(result.path / "press.txt")[:, 1]
+        self.assertEqual(force[0], 0)
+        self.assertGreater(force.max(), 0.1)
 
 
 if __name__ == "__main__":
