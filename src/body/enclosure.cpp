@@ -469,12 +469,15 @@ CellBounds enclose_in_frame(const BezierPatch& patch, const Cell& cell, bool wit
   out.speed_u = speed_u / cell.du;
   out.speed_v = speed_v / cell.dv;
 
-  if (!(det.low() > 0 && form.a.low() > 0)) {
-    bound_any_curvature(ju, jv, form, length.low(), &out);
-    return out;
-  }
+  // Curvatures, which vary little along a nearly flat direction, where the radii below vary much.
+  bound_any_curvature(ju, jv, form, length.low(), &out);
+  out.convex = out.least_curvature > 0;
+  if (out.convex) out.max_radius = 1 / out.least_curvature;
+  const bool rated = with_rate && !(polar && touches);
+  if (rated && out.convex) out.seen_rate = rate_at(patch, cell.u0 + 0.5 * cell.du, cell.v0 + 0.5 * cell.dv);
+  if (!(det.low() > 0 && form.a.low() > 0)) return out;
   out.convex = true;
-  out.least_curvature = 0;
+  out.least_curvature = std::max(0.0, out.least_curvature);
   // Tangent vectors T_k that lie over t_k, and what parameters change by when the normal turns along them:
   // p_k = |N| D^-1 J' T_k; then W(T_k, T_l) = p_k . J' T_l.
   const AffineForm over_z = inverse(m.z), slope[2] = {m.x * over_z, m.y * over_z};
@@ -491,11 +494,11 @@ CellBounds enclose_in_frame(const BezierPatch& patch, const Cell& cell, bool wit
   // A unit tangent is q1 T1 + q2 T2 with cos(cone) <= |q| <= 1.
   const Range radii = eigenvalues(w);
   const double upright2 = std::cos(out.cone) * std::cos(out.cone);
-  out.max_radius = radii.high;
+  out.max_radius = std::min(out.max_radius, radii.high);
   const double shortest2 = length.low() * length.low();
   const double product = shortest2 * shortest2 / det.high() * frame.det * frame.det;
-  out.min_radius = std::max({0.0, radii.low * upright2, product / radii.high});
-  if ((polar && touches) || !with_rate) return out;
+  out.min_radius = std::max({out.min_radius, radii.low * upright2, product / radii.high});
+  if (!rated) return out;
   out.seen_rate = rate_at(patch, cell.u0 + 0.5 * cell.du, cell.v0 + 0.5 * cell.dv);
 
   // The third-order form C(t, t, t) = 3 t . x_ij p_i p_j + n . x_ijk p_i p_j p_k.

@@ -6,6 +6,7 @@
 
 #include "body/connectivity.h"
 #include "body/cube_map.h"
+#include "body/joints.h"
 #include "body/local_form.h"
 #include "body/shape.h"
 #include "body/surface_bounds.h"
@@ -65,17 +66,27 @@ class Painter {
       paint_wide(b.axis, angle, radius, map_);
   }
 
+  // Creases that open are left as they are: on the surface at a small distance e outside they are tubes, and
+  // corners at which all joints open are caps, of radius e and positive orientation, and in h'' + h they count
+  // with radius 0.
   void paint_joints() {
     const double gap = kJointRoundoff * shape_.bounding_radius;
     for (size_t p = 0; p < shape_.patches.size(); ++p)
       for (int e = 0; e < 4; ++e) {
         const EdgeLink& link = shape_.links[p][e];
-        if (std::abs(link.kink) > kNoKink || link.kink_bound > kNoKink || link.gap > gap)
+        const bool kinked = std::abs(link.kink) > kNoKink || link.kink_bound > kNoKink;
+        if (link.gap > gap || (kinked && may_close(static_cast<int>(p), e)))
           paint_joint(static_cast<int>(p), e);
       }
   }
 
  private:
+  bool may_close(int patch, int edge) const {
+    const EdgeLink& link = shape_.links[patch][edge];
+    if (link.patch < 0 || link.kink < -kNoKink) return true;
+    return bound_kink(shape_.patches[patch], edge, shape_.patches[link.patch], link).closing > kNoKink;
+  }
+
   // The normals of both sides and those between.
   void paint_joint(int patch, int edge) {
     const EdgeLink& link = shape_.links[patch][edge];

@@ -13,8 +13,8 @@ namespace nurbs {
 struct Shape;
 struct SurfaceBounds;
 
-// Cells of a cube map. With r = radius_at(n) finite, no dent, crease or flat has a normal within
-// kNormalMargin of n, and every curvature radius whose normal lies there is at most r. So the surface point x
+// Cells of a cube map. With r = radius_at(n) finite, no dent, flat, closing or gaping joint has a normal
+// within kNormalMargin of n, and every curvature radius whose normal lies there is at most r. So the surface point x
 // with normal n is the only one, h(n) = n.x, and for |d - n| <= kNormalMargin, by h'' + h <= r along the
 // great circle,
 //     h(d) <= d.x + r (1 - d.n).
@@ -29,7 +29,7 @@ struct NormalMap {
 // Of a shape whose patches, links, bounds, dents and curvatures are done, if it has dents or its largest
 // curvature radius exceeds kLongRadius bounding radii; empty for others. From the leaves of `bounds`, whose
 // normals and radii are proven, halved further; cells that no leaf's normals reach are infinite, and so are
-// the normals at kinked or gaping joints, which are sampled and widened. Some ms to some tens of ms, 100 kB.
+// the normals at closing or gaping joints, which are sampled and widened. Some ms to some tens of ms, 100 kB.
 NormalMap make_normal_map(const Shape& shape, SurfaceBounds* bounds);
 
 }  // namespace nurbs

@@ -130,6 +130,7 @@ class Bounder {
       }
     const int most = kMostCells + kMostCellsPerPatch * patches_;
     if (!sphere_) halve_while([this](const Open& o) { return least_loose(o); }, kLeastRadiusBudget * most);
+    halve_while([this](const Open& o) { return unproven(o); }, std::max(most, out_.cells + most / 2));
     halve_while([this](const Open& o) { return radii_loose(o); }, std::max(most, out_.cells + most / 2));
     begin_rates();
     halve_while([this](const Open& o) { return rate_loose(o); },
@@ -191,11 +192,15 @@ class Bounder {
     return o.leaf.bounds.min_radius < out_.seen_min / kRadiusTightness;
   }
 
+  bool unproven(const Open& o) const {
+    const CellBounds& b = o.leaf.bounds;
+    return !b.convex && o.depth < kDeepestUnproven && b.seen_curvature > 0 &&
+           !is_flat(b, shape_.bounding_radius);
+  }
+
   bool radii_loose(const Open& o) const {
     const CellBounds& b = o.leaf.bounds;
-    if (!b.convex)
-      return o.depth < kDeepestUnproven && b.seen_curvature > 0 && !is_flat(b, shape_.bounding_radius);
-    if (sphere_) return false;
+    if (!b.convex || sphere_) return false;
     return b.min_radius < out_.seen_min / kRadiusTightness || b.max_radius > kRadiusTightness * out_.seen_max;
   }
 
