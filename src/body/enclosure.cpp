@@ -264,8 +264,8 @@ double square2(double x) {
 
 // Curvatures that need not be positive: D / |N| in a basis that is orthonormal in the middle. Its first
 // vector along u or along v: either may be a ruling.
-void bound_any_curvature(const AffineVector& ju, const AffineVector& jv, const FormMatrix& d,
-                         double least_length, CellBounds* out) {
+void bound_any_curvature(const AffineVector& ju, const AffineVector& jv, const FormMatrix& d, Range length,
+                         CellBounds* out) {
   double least = -kInfinity, most = kInfinity;
   for (const bool swapped : {false, true}) {
     const AffineVector &first = swapped ? jv : ju, &other = swapped ? ju : jv;
@@ -280,8 +280,9 @@ void bound_any_curvature(const AffineVector& ju, const AffineVector& jv, const F
     const FormMatrix metric{dot(t, t), dot(t, s), dot(s, s)};
     const Range k = eigenvalues(bend), stretch = eigenvalues(metric);
     if (!(stretch.low > 0)) continue;
-    least = std::max(least, (k.low < 0 ? k.low / stretch.low : k.low / stretch.high) / least_length);
-    most = std::min(most, std::max(k.high, 0.0) / stretch.low / least_length);
+    least = std::max(least,
+                     k.low < 0 ? k.low / (stretch.low * length.low) : k.low / (stretch.high * length.high));
+    most = std::min(most, std::max(k.high, 0.0) / (stretch.low * length.low));
   }
   out->least_curvature = least;
   out->min_radius = 1 / most;
@@ -470,7 +471,7 @@ CellBounds enclose_in_frame(const BezierPatch& patch, const Cell& cell, bool wit
   out.speed_v = speed_v / cell.dv;
 
   // Curvatures, which vary little along a nearly flat direction, where the radii below vary much.
-  bound_any_curvature(ju, jv, form, length.low(), &out);
+  bound_any_curvature(ju, jv, form, {length.low(), length.high()}, &out);
   out.convex = out.least_curvature > 0;
   if (out.convex) out.max_radius = 1 / out.least_curvature;
   const bool rated = with_rate && !(polar && touches);

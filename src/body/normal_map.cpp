@@ -67,8 +67,8 @@ class Painter {
   }
 
   // Creases that open are left as they are: on the surface at a small distance e outside they are tubes, and
-  // corners at which all joints open are caps, of radius e and positive orientation, and in h'' + h they count
-  // with radius 0.
+  // corners at which all joints open are caps, of radius e and positive orientation, and in h'' + h they
+  // count with radius 0.
   void paint_joints() {
     const double gap = kJointRoundoff * shape_.bounding_radius;
     for (size_t p = 0; p < shape_.patches.size(); ++p)

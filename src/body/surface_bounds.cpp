@@ -133,8 +133,9 @@ class Bounder {
     halve_while([this](const Open& o) { return unproven(o); }, std::max(most, out_.cells + most / 2));
     halve_while([this](const Open& o) { return radii_loose(o); }, std::max(most, out_.cells + most / 2));
     begin_rates();
-    halve_while([this](const Open& o) { return rate_loose(o); },
-                out_.cells + kMostRateCells + kMostCellsPerPatch * patches_);
+    const int enough = out_.cells + kMostRateCells + kMostCellsPerPatch * patches_;
+    halve_while([this](const Open& o) { return unrated(o) && rate_loose(o); }, enough);
+    halve_while([this](const Open& o) { return rate_loose(o); }, enough);
     for (Open& o : open_) out_.leaves.push_back(std::move(o.leaf));
     finish();
     return std::move(out_);
@@ -204,10 +205,12 @@ class Bounder {
     return b.min_radius < out_.seen_min / kRadiusTightness || b.max_radius > kRadiusTightness * out_.seen_max;
   }
 
+  bool unrated(const Open& o) const { return !(o.leaf.bounds.rate < kInfinity) && wants_rate(o.leaf.cell); }
+
   bool rate_loose(const Open& o) const {
     const CellBounds& b = o.leaf.bounds;
-    if (sphere_ || !b.convex || b.seen_rate == 0 || b.seen_rate > kUselessRate * shape_.bounding_radius)
-      return false;
+    if (sphere_) return b.convex && unrated(o);
+    if (!b.convex || b.seen_rate == 0 || b.seen_rate > kUselessRate * shape_.bounding_radius) return false;
     const double floor = std::max(kRateFloor * seen_rate_[o.leaf.cell.patch], kSmallRate * out_.seen_max);
     return b.rate > kRateTightness * std::max(b.seen_rate, floor);
   }
