@@ -14,6 +14,7 @@
 #include "body/support.h"
 #include "contact/pair_search.h"
 #include "io/pair_case.h"
+#include "io/shape_file.h"
 #include "nurbs/tolerances.h"
 #include "shapes/primitives.h"
 #include "shapes/revolved.h"
@@ -170,6 +171,29 @@ TEST(Radii, see_a_spike_between_all_samples) {
     const auto shape = make_shape("spike", body);
     EXPECT_LE(shape->patch_curvature.min_radius, least * (1 + 1e-6)) << ratio;
     EXPECT_GE(shape->patch_curvature.min_radius, 0.5 * least) << ratio;
+  }
+}
+
+// Nearly flat faces, curvature radii to a hundred times the body's size, joints that open by 0.3 degrees: all
+// of it is proven, so that no contact needs the hull to confirm it.
+TEST(Radii, of_nearly_flat_faces_are_proven) {
+  const ShapePointer s = read_shape_file("examples/shapes/blocky.json");
+  EXPECT_TRUE(s->proofs.convex);
+  EXPECT_GE(s->patch_curvature.min_radius, s->proofs.seen_min / 1.2);
+  EXPECT_LE(s->patch_curvature.max_radius, 4 * s->proofs.seen_max);
+  for (const float radius : s->normal_map.radius) EXPECT_LT(radius, 1e6f);
+  for (const PatchRate& patch : s->rates)
+    for (const PatchRate::Cell& cell : patch.cells) EXPECT_LT(cell.rate, 1e30f);
+  // The map's promise against brute force: no surface point rises above the ball.
+  Random random(5);
+  for (int k = 0; k < 2000; ++k) {
+    const SurfacePoint at{static_cast<int>(random.uniform(0, 0.999 * static_cast<double>(s->patches.size()))),
+                          random.uniform(0, 1), random.uniform(0, 1)};
+    const LocalForm f = local_form(s->patches[at.patch], at.u, at.v);
+    const double r = s->normal_map.radius_at(f.normal);
+    const Vec3 d = (f.normal + kNormalMargin * random.uniform(0, 1) * random.direction()).normalized();
+    if ((d - f.normal).norm() > kNormalMargin) continue;
+    EXPECT_LE(find_support(*s, d).h, d.dot(f.point) + 0.5 * r * (d - f.normal).squaredNorm() + 1e-14);
   }
 }
 
