@@ -14,6 +14,8 @@
 namespace nurbs {
 namespace {
 
+constexpr double kFanSafety = 1.1;  // sines of slopes stand for angles
+
 // The end of edge `edge` in patch parameters, and which parameter is pinned on it.
 bool pins_u(int edge) {
   return edge < 2;
@@ -196,6 +198,39 @@ double excess_at(const Shape& shape, const Vec3& d, const SurfacePoint& at, cons
   return rolling_excess(radii.outer, shape.bounding_radius, chord2) + radii.slack;
 }
 
+// The edge of its patch that a point lies on; -1 inside and at corners.
+int edge_of(const SurfacePoint& at) {
+  const int u = at.u <= 0 ? 0 : at.u >= 1 ? 1 : -1, v = at.v <= 0 ? 2 : at.v >= 1 ? 3 : -1;
+  return u < 0 ? v : v < 0 ? u : -1;
+}
+
+// The same at a point x of a crease that opens. Of the directions m in the fan between its sides' normals x
+// is the support: no other point has such a normal (normal_map.h, or the body has no dents at all). Beyond
+// the fan h(d) <= d.x + r (1 - d.m), r the largest curvature radius near d. Infinite where there is no fan
+// near d, or nothing is promised there.
+double crease_excess(const Shape& shape, const Vec3& d, const SurfacePoint& at, const Jet2& jet) {
+  constexpr double kNone = std::numeric_limits<double>::infinity();
+  const int edge = edge_of(at);
+  if (edge < 0 || shape.joints.none()) return kNone;
+  const EdgeLink& link = shape.links[at.patch][edge];
+  if (link.collapsed || link.patch < 0) return kNone;
+  const bool round = shape.normal_map.cells == 0 && shape.joints.concave == 0 && shape.joint_slack == 0;
+  const double radius = round ? shape.patch_curvature.max_radius : shape.normal_map.radius_at(d);
+  if (!(radius < kFarAway)) return kNone;
+  const SurfacePoint q = across(shape.patches, link, at, edge);
+  const Jet1 here{jet.s, jet.su, jet.sv}, there = evaluate1(shape.patches[q.patch], q.u, q.v);
+  const Normal na = normal_at(shape, here.su, here.sv), nb = normal_at(shape, there.su, there.sv);
+  if (!(std::max(na.noise, nb.noise) < kNormalMargin) || !(d.dot(na.n) > 0) || !(d.dot(nb.n) > 0))
+    return kNone;
+  // The slopes of d . x away from x: along the crease, and into either side.
+  const Vec3& along = pins_u(edge) ? jet.sv : jet.su;
+  const double chord = std::abs(d.dot(along)) / along.norm() + na.noise + nb.noise +
+                       std::max(0.0, inward_slope(here, edge, d)) +
+                       std::max(0.0, inward_slope(there, link.edge, d));
+  if (!(chord <= 0.5 * kNormalMargin)) return kNone;
+  return kFanSafety * 0.5 * radius * chord * chord + link.gap;
+}
+
 // Ascent from `at` to a local maximum of d . s.
 Support climb(const Shape& shape, const Vec3& d, SurfacePoint at) {
   Support best;
@@ -257,7 +292,9 @@ Support climb(const Shape& shape, const Vec3& d, SurfacePoint at) {
   best.h = f;
   const Normal normal = normal_at(shape, jet.su, jet.sv);
   best.normal = std::isfinite(normal.noise) ? normal.n : d;
-  best.upper = f + excess_at(shape, d, at, normal) + kRoundoff * size;
+  double excess = excess_at(shape, d, at, normal);
+  if (excess > kRoundoff * size) excess = std::min(excess, crease_excess(shape, d, at, jet));
+  best.upper = f + excess + kRoundoff * size;
   return best;
 }
 
