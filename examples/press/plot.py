@@ -39,7 +39,7 @@ def main(folder):
             axes[0].plot(1e3 * (depth - touch), force, lw=1)
             axes[1].plot(1e3 * (depth - touch), work, lw=1, color="tab:blue")
             axes[1].plot(1e3 * (depth - touch), held, lw=1, ls="--", color="tab:red")
-    for axis, title in zip(axes, ("force on the punch, N", "work of the punch; dashed: springs + dissipated, J")):
+    for axis, title in zip(axes, ("force on the punch, N", "work; dashed: springs + dissipated, J")):
         axis.set(xlabel="displacement from touch, mm", xlim=(-0.5, None), title=title)
     figure.tight_layout()
     figure.savefig(folder / "force.png", dpi=110)
