@@ -13,6 +13,7 @@ namespace {
 constexpr int kFewCells = 4;             // of a plane, up to which each is looked at on its own
 constexpr double kOneSlope = 0.8;        // cosine
 constexpr double kSamePlane = 1 - 1e-6;  // cosine: a former contact's polygon stood on this plane
+constexpr double kBluntest = 0.5;        // of the curvature radius: deeper overlaps find the body sharp
 constexpr double kSameNormal = 0.9;      // cosine: a former contact this near has a start for the search
 
 // A plane that the body overlaps.
@@ -259,6 +260,7 @@ class SurfaceSearch {
     c.on_body = met.deepest;
     c.triangle = triangle;
     c.plane = number;
+    c.of[0] = patch_.unbounded() ? 0 : patch_.planes()[number].leader;
     c.rung = met.result.rung;
     c.iterations = met.result.iterations;
     c.converged = met.result.status == Status::converged;
@@ -358,7 +360,8 @@ class SurfaceSearch {
                                         : MetEdge::along;
     if (met.state != MetEdge::along) return;
     if (e.sides == 1 && covered(f, patch_.side(e.first_side).cell)) return;
-    add_feature(f, weight, patch_.cells()[patch_.side(e.first_side).cell].triangle);
+    const auto triangle = [&](int i) { return patch_.cells()[patch_.side(e.first_side + i).cell].triangle; };
+    add_feature(f, weight, triangle(0), SurfaceContact::edge, triangle(0), e.sides > 1 ? triangle(1) : -1);
   }
 
   // Whether a point of a border lies within another cell: meshes that overlap themselves have no border
@@ -407,7 +410,8 @@ class SurfaceSearch {
     for (int i = 0; i < v.cells; ++i)
       if (cell_climbs(patch_.cell_at(v.first_cell + i), number, f.normal)) --weight;
     if (weight == 0) return;
-    add_feature(f, weight, patch_.cells()[patch_.cell_at(v.first_cell)].triangle);
+    add_feature(f, weight, patch_.cells()[patch_.cell_at(v.first_cell)].triangle, SurfaceContact::vertex,
+                v.triangle, v.corner);
   }
 
   // Edges within a plane are not met.
@@ -440,9 +444,16 @@ class SurfaceSearch {
     return false;
   }
 
-  void add_feature(const FeatureContact& f, int weight, int triangle) {
+  void add_feature(const FeatureContact& f, int weight, int triangle, SurfaceContact::Piece piece, int first,
+                   int second) {
+    const Shape& shape = *particle_.shape;
+    if (weight < 0 && edged(shape) && -f.gap > kBluntest * particle_.scale * shape.curvature.min_radius)
+      return;
     SurfaceContact c;
     c.weight = weight;
+    c.piece = piece;
+    c.of[0] = first;
+    c.of[1] = second;
     c.gap = f.gap;
     c.normal = f.normal;
     c.on_body = f.on_body;

@@ -33,6 +33,10 @@ struct SurfaceContact {
   Vec3 on_body = Vec3::Zero();  // deepest point, relative to the body's centre of mass, lab axes
   int triangle = -1;            // one that has the point, as numbered in the patch
   int plane = -1;               // of the patch, for faces; else -1
+  // The piece of the wall: a plane and its leading triangle, an edge and the first two at it, a vertex as a
+  // triangle and its corner.
+  enum Piece { face, edge, vertex } piece = face;
+  int of[2] = {-1, -1};
   bool flat = false;            // a flat face, crease or ruled line stands on the plane
   Rung rung = Rung::none;
   int iterations = 0;
@@ -57,11 +61,19 @@ struct SurfaceContacts {
   void add(const SurfaceContact& c);
 };
 
+// Whether a body has flat faces, creases or corners, so that its contacts with pieces of a bent wall come and
+// go at finite overlap.
+inline bool edged(const Shape& shape) {
+  return !shape.smooth || !shape.flats.empty();
+}
+
 // The region that a plane of the patch is.
 void plane_region(const MeshPatch& patch, int plane, const Vec3& body, PlaneRegion* region);
 
 // A body whose flat face, crease or ruled line stands on a plane has one contact with all of that plane, and
-// none with its edges: contact_polygon.h has the points.
+// none with its edges: contact_polygon.h has the points. Where a body is sharper than its overlap is deep, gaps
+// at edges are no critical values, and nothing is taken off: its contacts come and go at finite overlap, and
+// scene/wall_energy.cpp sees to it that their energies add up.
 //
 // `path`: the body's and the wall's, as in Bodies::path; planes that the body is proven clear of are not
 // looked at before it has gone far enough. `former`: contacts of the last step, whose memory is gone on from.

@@ -62,8 +62,8 @@ struct WallContact {
   double weight = 1;     // +1, or below 0: what other contacts count twice
   Vec3 velocity = Vec3::Zero(), spin = Vec3::Zero();  // of the wall at point_a; lab
   int mark = 0;                                       // the caller's
-  const PlaneRegion* region =
-      nullptr;  // that a flat feature of the body stands on, until the end of the step
+  PlaneRegion* region = nullptr;  // that a flat feature of the body stands on, until the end of the step
+  std::uint64_t name = 0;         // of the piece of the wall
   PairMemory memory;
 };
 
@@ -126,8 +126,10 @@ class ContactStages {
   static constexpr int kMostListed = 32;
   void begin_step(const Step& step);
   // What came of the last step's contacts is carried over to those of this one by place and normal, whatever
-  // part of the wall they were on; those without a successor are closed.
-  void give(int body, std::int32_t* head, const WallContact* found, int count);
+  // part of the wall they were on; those without a successor are closed. `balanced`: contacts that come or go
+  // at finite overlap neither bring nor, if it can be helped, take energy (wall_energy.cpp); `found` is changed
+  // accordingly.
+  void give(int body, std::int32_t* head, WallContact* found, int count, bool balanced = false);
   void end_step(double neighbours);
   // The memory of a body's contacts and their normals, where the next search goes on; how many.
   int former(std::int32_t head, Vec3* normals, PairMemory* memories, bool* flat) const;
@@ -213,6 +215,9 @@ class ContactStages {
   ModelMemory& model_memory(const ContactBlock& block, int lane) {
     return *reinterpret_cast<ModelMemory*>(pool_.memory(block, lane));
   }
+  double model_energy(const ContactBlock& block, int lane, const ContactGeometry& geometry);
+  ModelContact model_contact(const ContactBlock& block, int lane, const ContactGeometry& geometry,
+                             const ModelMemory& own) const;
   SphereCurvatures model_curvatures(const ContactBlock& block, int lane,
                                     const ContactGeometry& geometry) const;
   void apply_model(ContactBlock& block, const Results& results);
@@ -235,6 +240,10 @@ class ContactStages {
     bool seen = false;
     double body[3] = {};                  // where the body was in the last step
     const PlaneRegion* region = nullptr;  // of this step
+    // Of balanced contacts.
+    std::uint64_t name = 0;  // of the piece of the wall
+    double level = 0;        // normal . wall's point
+    double shift = 0;        // by which the wall stands back, length
   };
   Partner& partner(std::int32_t number) { return partners_[number - 1]; }
   const Partner& partner(std::int32_t number) const { return partners_[number - 1]; }
@@ -246,6 +255,21 @@ class ContactStages {
   void inherit(std::int32_t number, std::int32_t parent, const WallContact& found);
   void count_listed(const WallContact& found, std::int32_t number, int body);
   void update_listed(std::int32_t number, int body, const WallContact& found);
+
+  // What contacts that take each other's place hold: wall_energy.cpp.
+  struct Holding;
+  double unit_energy(std::int32_t number, int body, const ContactGeometry& geometry);
+  double overlap_of(std::int32_t number, int body, ContactGeometry geometry, double energy);
+  double polygon_energy(std::int32_t number, int body, double shift);
+  double leaving_energy(std::int32_t number, int body);
+  bool same_piece(std::int32_t number, int body, const WallContact& found) const;
+  PolygonState polygon_state(const ContactPolygon& polygon, int b, const Vec3& wall, int a) const;
+  void balance_found(int body, WallContact* found, const std::int32_t* number, const bool* known, int count,
+                     double left);
+  void stand_closer(std::int32_t number, int body, const ContactGeometry& geometry);
+  void hold(Holding* h, int body, double energy);
+  void balance(int body, Holding* holdings, int count, double left);
+  void stand_back(std::int32_t number, WallContact* found);
 
   // Flat faces, creases and ruled lines: flat_stage.cpp.
   bool may_be_flat(int a, int b) const;

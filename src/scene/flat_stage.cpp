@@ -4,17 +4,10 @@
 #include <cmath>
 
 #include "scene/contact_results.h"
+#include "scene/wall_energy.h"
 
 namespace nurbs {
 namespace {
-
-// Of its distance to 1 that a factor moves in a step: a corner that has come down flat is up to four times
-// too stiff, and the spring energy that it gives up is booked. A factor below 1 waits until the contact
-// rests: what raising it puts in is booked too, and is then no more than the springs hold under the bodies'
-// weight.
-constexpr double kRelaxation = 2e-3;
-constexpr double kResting = 1e-4;  // of its overlap that a contact at rest moves along the normal in a step
-constexpr double kStiffest = 8;    // factor or weight of a contact; four is what a corner needs
 
 BodyFrame frame_of(const BodyRecord& r, double scale, const Shape* shape) {
   BodyFrame f;
@@ -85,6 +78,10 @@ static PolygonState now(const ContactPolygon& polygon, const Bodies& bodies, con
     return frame_of(bodies.record(i), arrays.scale[i], arrays.shapes[arrays.shape[i]]);
   };
   return evaluate(polygon, a < 0 ? plane_frame(wall) : frame(a), frame(b));
+}
+
+PolygonState ContactStages::polygon_state(const ContactPolygon& polygon, int b, const Vec3& wall, int a) const {
+  return now(polygon, *step_.bodies, wall, a, b);
 }
 
 // The polygon of two bodies that touch, or of a body and the wall; false where they meet at a point.

@@ -66,24 +66,11 @@ void ContactStages::apply_model(ContactBlock& block, const Results& results) {
     if (results.touching[lane] != 0) ask_model(block, lane, results.geometry(lane), true);
 }
 
-void ContactStages::ask_model(ContactBlock& block, int lane, const ContactGeometry& g, bool moves_on) {
+// The question that a contact puts to the model, without its history.
+ModelContact ContactStages::model_contact(const ContactBlock& block, int lane, const ContactGeometry& g,
+                                          const ModelMemory& own) const {
   const int a = block.a[lane], b = block.b[lane];
   const BodyRecord &ra = record(a), &rb = record(b);
-  ModelMemory& own = model_memory(block, lane);
-  if (own.kind != step_.model->kind()) {  // a new contact, or one of another model, by a restart
-    std::fill_n(pool_.memory(block, lane), pool_.memory_size(), 0.0);
-    own.kind = step_.model->kind();
-  }
-  const ModelMemory old = own;
-  ContactState before, state{};
-  block.get(lane, kStateField, kContactStateSize, &before);
-
-  const bool known = own.curvature_a != 0 || own.curvature_b != 0;
-  if (!known) {
-    const SphereCurvatures k = model_curvatures(block, lane, g);
-    own.curvature_a = k.a;
-    own.curvature_b = k.b;
-  }
   ModelContact c;
   c.a = a;
   c.b = b;
@@ -101,6 +88,45 @@ void ContactStages::ask_model(ContactBlock& block, int lane, const ContactGeomet
   c.mass_a = a < 0 ? c.mass_b : mass[a];
   const double compliance = ra.inverse_mass + rb.inverse_mass;
   c.mass = a < 0 ? c.mass_b : compliance > 0 ? 1 / compliance : c.mass_a * c.mass_b / (c.mass_a + c.mass_b);
+  return c;
+}
+
+// What the model would hold across the normal at another geometry, for the whole stiffness.
+double ContactStages::model_energy(const ContactBlock& block, int lane, const ContactGeometry& g) {
+  ModelMemory own = model_memory(block, lane);
+  double history[kMostModelMemory] = {};
+  if (own.kind == step_.model->kind())
+    std::copy_n(pool_.memory(block, lane) + kModelMemory, pool_.memory_size() - kModelMemory, history);
+  if (own.kind != step_.model->kind() || (own.curvature_a == 0 && own.curvature_b == 0)) {
+    const SphereCurvatures k = model_curvatures(block, lane, g);
+    own.curvature_a = k.a;
+    own.curvature_b = k.b;
+  }
+  ModelContact c = model_contact(block, lane, g, own);
+  c.moves_on = false;
+  c.history = history;
+  step_.model->force(c);
+  return std::isfinite(c.normal_energy) ? c.normal_energy : 0;
+}
+
+void ContactStages::ask_model(ContactBlock& block, int lane, const ContactGeometry& g, bool moves_on) {
+  const int a = block.a[lane], b = block.b[lane];
+  ModelMemory& own = model_memory(block, lane);
+  if (own.kind != step_.model->kind()) {  // a new contact, or one of another model, by a restart
+    std::fill_n(pool_.memory(block, lane), pool_.memory_size(), 0.0);
+    own.kind = step_.model->kind();
+  }
+  const ModelMemory old = own;
+  ContactState before, state{};
+  block.get(lane, kStateField, kContactStateSize, &before);
+
+  const bool known = own.curvature_a != 0 || own.curvature_b != 0;
+  if (!known) {
+    const SphereCurvatures k = model_curvatures(block, lane, g);
+    own.curvature_a = k.a;
+    own.curvature_b = k.b;
+  }
+  ModelContact c = model_contact(block, lane, g, own);
   c.moves_on = moves_on;
   c.history = pool_.memory(block, lane) + kModelMemory;
   step_.model->force(c);

@@ -138,6 +138,7 @@ void SurfaceWall::find_for(int body, const ContactStages::Step& step,
     const SurfaceContact& c = contacts_.contact[k];
     WallContact& f = found_[k];
     f.weight = c.weight;
+    f.name = name_of(c, body, meshes);
     f.region = nullptr;
     if (c.flat) {
       if (regions_used_ == regions_.size()) regions_.emplace_back();
@@ -156,7 +157,22 @@ void SurfaceWall::find_for(int body, const ContactStages::Step& step,
     r.point_a = r.point_b - c.gap * c.normal;
     motion_at(c, r.point_a, body, meshes, &f);
   }
-  stages->give(body, head, found_, contacts_.count);
+  stages->give(body, head, found_, contacts_.count, kind_ == Kind::mesh && edged(*particle.shape));
+}
+
+// The piece of the wall that a contact is with, whatever else is near.
+std::uint64_t SurfaceWall::name_of(const SurfaceContact& c, int body,
+                                   const std::vector<TriangleArray>& meshes) const {
+  if (kind_ != Kind::mesh) return 0;
+  const std::vector<int>& chosen = patches_[patch_of_[body]]->near;
+  const Near& near = near_[chosen[c.of[0]]];
+  const auto id = [&](int triangle) -> std::uint64_t {
+    if (triangle < 0) return 0;
+    const Near& n = near_[chosen[triangle]];
+    return 1 + static_cast<std::uint64_t>(meshes[n.mesh].id[n.triangle]);
+  };
+  const std::uint64_t second = c.piece == SurfaceContact::vertex ? c.of[1] : id(c.of[1]);
+  return (second << 35) ^ (id(c.of[0]) << 6) ^ static_cast<std::uint64_t>(near.mesh << 2 | c.piece);
 }
 
 // Bodies move little between two lists of neighbours: triangles further away than kMargin are left for later.

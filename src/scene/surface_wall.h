@@ -71,6 +71,7 @@ class SurfaceWall {
   void choose(const BodyRecord& body, int number, double path, const std::vector<TriangleArray>& meshes,
               Patch* patch) const;
   void gather(const Patch& patch, const std::vector<TriangleArray>& meshes);
+  std::uint64_t name_of(const SurfaceContact& c, int body, const std::vector<TriangleArray>& meshes) const;
   void motion_at(const SurfaceContact& c, const Vec3& point, int body,
                  const std::vector<TriangleArray>& meshes, WallContact* out) const;
 

@@ -11,7 +11,7 @@ namespace {
 
 constexpr double kSameSide = 0.7;  // cosine between normals: 45 degrees
 constexpr int kListedSize =
-    7 + kProofSize;  // doubles of a listed contact beside its record: x, mark, body, proof
+    10 + kProofSize;  // doubles of a listed contact beside its record: see pack_list
 
 }  // namespace
 
@@ -86,7 +86,7 @@ void ContactStages::update_listed(std::int32_t number, int body, const WallConta
   bind_listed(number, body);
   if (FlatContact* flat = pool_.flat(number); flat && p.region) {  // the wall may have moved
     store(p.region->normal, flat->polygon.normal);
-    flat->polygon.offset = p.region->normal.dot(p.region->origin - x);
+    flat->polygon.offset = p.region->normal.dot(p.region->origin - x);  // it stands back already
   }
   if (found.weight < 0) block.field[kWeight][lane] = found.weight;
   ContactResult r = found.result;
@@ -96,12 +96,12 @@ void ContactStages::update_listed(std::int32_t number, int body, const WallConta
   block.fresh[lane] = static_cast<int>(fresh_.size());
 }
 
-void ContactStages::give(int body, std::int32_t* head, const WallContact* found, int count) {
+void ContactStages::give(int body, std::int32_t* head, WallContact* found, int count, bool balanced) {
   struct Old {
     std::int32_t number;
     Vec3 normal, point;
     double weight;
-    bool taken;
+    bool taken, flat;
   };
   Old old[kMostListed];
   int olds = 0;
@@ -116,7 +116,10 @@ void ContactStages::give(int body, std::int32_t* head, const WallContact* found,
     BodyRecord& wall = partner(n).record;
     // A body that comes back through a periodic border takes its walls along.
     const Vec3 moved = load(b.x) - load(partner(n).body);
-    if (moved.squaredNorm() > b.radius * b.radius) store(Vec3(load(wall.x) + moved), wall.x);
+    if (moved.squaredNorm() > b.radius * b.radius) {
+      store(Vec3(load(wall.x) + moved), wall.x);
+      partner(n).level += load(state.normal).dot(moved);
+    }
     Vec3 normal = load(state.normal), point = load(wall.x) + load(state.arm_a);
     if (const FlatContact* flat = pool_.flat(n)) {
       const ContactPolygon& polygon = flat->polygon;
@@ -126,14 +129,21 @@ void ContactStages::give(int body, std::int32_t* head, const WallContact* found,
       const Particle particle = step_.bodies->particle(body);
       point = particle.x + particle.scale * (particle.q * middle);
     }
-    old[olds++] = {n, normal, point, block.field[kWeight][lane], false};
+    old[olds++] = {n, normal, point, block.field[kWeight][lane], false, block.field[kFlat][lane] != 0};
     reentrant = reentrant || block.field[kWeight][lane] < 0;
   }
   count = std::min(count, kMostListed);
   for (int k = 0; k < count; ++k) reentrant = reentrant || found[k].weight < 0;
 
-  // Nearest first.
+  // The same piece of the wall, then nearest first.
   std::int32_t number[kMostListed] = {};
+  for (int k = 0; k < count && balanced; ++k)
+    for (int i = 0; i < olds && number[k] == 0; ++i) {
+      if (old[i].taken || (old[i].weight < 0) != (found[k].weight < 0)) continue;
+      if ((old[i].flat && !found[k].region) || !same_piece(old[i].number, body, found[k])) continue;
+      old[i].taken = true;
+      number[k] = old[i].number;
+    }
   const auto distance2 = [&](const Old& o, const WallContact& f) {
     return (o.point - 0.5 * (f.result.point_a + f.result.point_b)).squaredNorm();
   };
@@ -144,6 +154,7 @@ void ContactStages::give(int body, std::int32_t* head, const WallContact* found,
       for (int k = 0; k < count && !old[i].taken; ++k) {
         if (number[k] != 0 || (old[i].weight < 0) != (found[k].weight < 0)) continue;
         if (old[i].normal.dot(found[k].result.normal) < kSameSide) continue;
+        if (balanced && old[i].flat) continue;  // a polygon stands on its plane
         const double d = distance2(old[i], found[k]);
         if (d < least) least = d, best_old = i, best_found = k;
       }
@@ -153,14 +164,25 @@ void ContactStages::give(int body, std::int32_t* head, const WallContact* found,
   }
 
   std::int32_t first = 0, *link = &first;
+  bool was_known[kMostListed];
   for (int k = 0; k < count; ++k) {
     const WallContact& f = found[k];
-    const bool known = number[k] != 0;
-    if (!known) {
-      ContactRecord record{f.memory.model, f.memory.on_a, f.memory.on_b, {}, {0, 0, 0}, 1, 0};
-      number[k] = add_listed(record);
-      store(f.result.point_a, partner(number[k]).record.x);
-    }
+    was_known[k] = number[k] != 0;
+    if (was_known[k]) continue;
+    ContactRecord record{f.memory.model, f.memory.on_a, f.memory.on_b, {}, {0, 0, 0}, 1, 0};
+    number[k] = add_listed(record);
+    store(f.result.point_a, partner(number[k]).record.x);
+    bind_listed(number[k], body);
+  }
+  if (balanced) {
+    double left = 0;
+    for (int i = 0; i < olds && !step_.setup; ++i)
+      if (!old[i].taken) left += leaving_energy(old[i].number, body);
+    balance_found(body, found, number, was_known, count, left);
+  }
+  for (int k = 0; k < count; ++k) {
+    const WallContact& f = found[k];
+    const bool known = was_known[k];
     const std::int32_t n = number[k];
     ContactBlock& block = pool_.block(n);
     const int lane = ContactPool::lane(n);
@@ -272,7 +294,10 @@ int ContactStages::pack_list(std::int32_t head, double* to) const {
     std::memcpy(to + m, p.record.x, 3 * sizeof(double));
     to[m + 3] = p.mark;
     std::memcpy(to + m + 4, p.body, 3 * sizeof(double));
-    std::memcpy(to + m + 7, &p.proof, sizeof p.proof);
+    std::memcpy(to + m + 7, &p.name, sizeof p.name);
+    to[m + 8] = p.level;
+    to[m + 9] = p.shift;
+    std::memcpy(to + m + 10, &p.proof, sizeof p.proof);
     m += kListedSize;
     m += pool_.pack(head, to + m);
   }
@@ -293,7 +318,10 @@ std::int32_t ContactStages::unpack_list(const double* from, int* size) {
     std::memcpy(p.record.x, values, 3 * sizeof(double));
     p.mark = static_cast<int>(values[3]);
     std::memcpy(p.body, values + 4, 3 * sizeof(double));
-    std::memcpy(&p.proof, values + 7, sizeof p.proof);
+    std::memcpy(&p.name, values + 7, sizeof p.name);
+    p.level = values[8];
+    p.shift = values[9];
+    std::memcpy(&p.proof, values + 10, sizeof p.proof);
     p.proof.contact = number;
     if (last == 0)
       first = number;

@@ -1,0 +1,301 @@
+// Energy at bent walls. A contact with one piece of a wall (a plane, an edge, a vertex) has a potential, but
+// of a body with flat faces or sharp corners such contacts come and go at finite overlap: a corner leaves the
+// prism over one triangle, a face comes to stand on a plane that its edge was on. Here the potentials are
+// fitted together, so that the sum over a body's contacts is continuous in its pose:
+//  - What the contacts that end would have held in this pose is shared by those that begin.
+//  - One that begins with less than its overlap makes has the wall *stand back* from it by a shift, in which
+//    nothing is felt: it is as stiff as any other, and it gives back what it took. The shift goes when the
+//    body comes out of it, and slowly under a body at rest.
+//  - One that begins with more is stiffer by a weight, as a corner's is that comes down flat (flat_stage.cpp).
+//  - A contact that begins at its surface, and one that opens there, hold nothing, and nothing is shared.
+// What finds no place is booked as damping. Friction springs go along as far as they lose by it.
+#include <algorithm>
+#include <cmath>
+
+#include "scene/contact_results.h"
+#include "scene/wall_energy.h"
+
+namespace nurbs {
+namespace {
+
+constexpr double kSamePlane = 1e-9;  // of normals, and of the bounding radius: two planes are one
+constexpr double kArrival = 1.1;     // ways of a step that a contact which begins at its surface is deep
+constexpr std::uint64_t kPiece = 3;  // bits of a name that say plane, edge or vertex; planes are 0
+
+bool rests(const ContactState& state) {
+  return state.active != 0 && std::abs(state.rate) * state.dt < kResting * state.overlap;
+}
+
+}  // namespace
+
+// Of a contact of weight 1.
+double ContactStages::unit_energy(std::int32_t number, int body, const ContactGeometry& g) {
+  if (!(g.overlap > 0)) return 0;
+  ContactBlock& block = pool_.block(number);
+  const int lane = ContactPool::lane(number);
+  block.b[lane] = body;
+  if (step_.model != nullptr) return model_energy(block, lane, g);
+  return 0.5 * step_.laws[block.law[lane]].kn * g.overlap * g.overlap;
+}
+
+// The overlap at which such a contact holds an energy; a model's is near enough a power of it.
+double ContactStages::overlap_of(std::int32_t number, int body, ContactGeometry g, double energy) {
+  if (!(energy > 0)) return 0;
+  const ContactBlock& block = pool_.block(number);
+  if (step_.model == nullptr)
+    return std::sqrt(2 * energy / step_.laws[block.law[ContactPool::lane(number)]].kn);
+  double power = 2.25;
+  double held = unit_energy(number, body, g);
+  for (int k = 0; k < 8 && held > 0 && std::abs(held - energy) > 1e-9 * energy; ++k) {
+    const double before = g.overlap, last = held;
+    g.overlap *= std::pow(energy / held, 1 / power);
+    held = unit_energy(number, body, g);
+    const double way = std::log(g.overlap / before);
+    if (way != 0 && held > 0) power = std::clamp(std::log(held / last) / way, 1.0, 4.0);
+  }
+  return g.overlap;
+}
+
+// Of a polygon's points in this pose, with the wall `shift` further back.
+double ContactStages::polygon_energy(std::int32_t number, int body, double shift) {
+  FlatContact& flat = *pool_.flat(number);
+  ContactPolygon polygon = flat.polygon;
+  polygon.offset -= shift;
+  const PolygonState state = polygon_state(polygon, body, wall_frame(-1 - number), -1 - number);
+  const ContactBlock& block = pool_.block(number);
+  if (step_.model == nullptr)
+    return step_.laws[block.law[ContactPool::lane(number)]].kn * stored_energy(polygon, state);
+  double sum = 0;
+  for (int k = 0; k < state.count; ++k) {
+    if (!(state.gap[k] < 0)) continue;
+    flat.points.b[k] = body;
+    flat.points.a[k] = -1 - number;
+    sum += polygon.factor * polygon.weight[k] *
+           model_energy(flat.points, k, {-state.gap[k], state.normal, state.arm_a[k], state.arm_b[k]});
+  }
+  return sum;
+}
+
+// What a contact that ends would hold in this pose.
+double ContactStages::leaving_energy(std::int32_t number, int body) {
+  const ContactBlock& block = pool_.block(number);
+  const int lane = ContactPool::lane(number);
+  const BodyRecord &wall = partner(number).record, &b = record(body);
+  if (const FlatContact* flat = pool_.flat(number)) {
+    const Vec3 normal = load(flat->polygon.normal);
+    return polygon_energy(number, body, -step_.dt * normal.dot(load(wall.velocity)));
+  }
+  ContactState state;
+  block.get(lane, kStateField, kContactStateSize, &state);
+  if (state.active == 0) return 0;
+  const Vec3 normal = load(state.normal), arm_a = load(state.arm_a), arm_b = load(state.arm_b);
+  const Vec3 velocity =
+      load(b.velocity) + load(b.spin).cross(arm_b) - load(wall.velocity) - load(wall.spin).cross(arm_a);
+  const double overlap = state.overlap - step_.dt * normal.dot(velocity), weight = block.field[kWeight][lane];
+  return weight * unit_energy(number, body, {overlap, normal, arm_a, arm_b});
+}
+
+// Whether a contact is with the piece of the wall that it was with before.
+bool ContactStages::same_piece(std::int32_t number, int body, const WallContact& found) const {
+  const Partner& p = partners_[number - 1];
+  if (p.name == found.name) return true;
+  if ((p.name & kPiece) != 0 || (found.name & kPiece) != 0) return false;
+  ContactState state;
+  const ContactBlock& block = pool_.blocks()[(number - 1) / kBlock];
+  const int lane = ContactPool::lane(number);
+  block.get(lane, kStateField, kContactStateSize, &state);
+  Vec3 normal = load(state.normal);
+  if (const double flat = block.field[kFlat][lane])
+    normal = load(pool_.flats()[static_cast<int>(flat) - 1].polygon.normal);
+  const Vec3& now = found.result.normal;
+  return (normal - now).norm() < kSamePlane &&
+         std::abs(now.dot(found.result.point_a) - p.level) < kSamePlane * record(body).radius;
+}
+
+// Gives a contact an energy, by the wall's shift or its weight.
+void ContactStages::hold(Holding* h, int body, double energy) {
+  Partner& p = partner(h->number);
+  ContactBlock& block = pool_.block(h->number);
+  const int lane = ContactPool::lane(h->number);
+  if (FlatContact* flat = pool_.flat(h->number)) {
+    if (energy > h->energy) {
+      flat->polygon.factor *= energy / h->energy;
+      return;
+    }
+    double low = 0, high = h->geometry.overlap;
+    for (int k = 0; k < 60; ++k) {
+      const double middle = 0.5 * (low + high);
+      (polygon_energy(h->number, body, middle) > energy ? low : high) = middle;
+    }
+    p.shift += high;
+    return;
+  }
+  double& weight = block.field[kWeight][lane];
+  const double before = weight;
+  const int sign = weight < 0 ? -1 : 1;
+  weight = sign * std::max(1.0, h->unit > 0 ? energy / h->unit : 1.0);
+  p.shift = energy < h->unit
+                ? h->geometry.overlap - overlap_of(h->number, body, h->geometry, energy)
+                : 0;
+  if (weight == before || step_.model != nullptr) return;
+  // The friction spring keeps its force, but gains no energy.
+  ContactState old, state{};
+  block.get(lane, kStateField, kContactStateSize, &old);
+  if (old.active == 0) return;
+  const ContactCoefficients &all = step_.laws[block.law[lane]], law = scaled(all, std::abs(weight));
+  const BodyMotion of_wall = motion_of(p.record), of_body = motion_of(record(body));
+  finish(scaled(all, std::abs(before)), -1 - h->number, body, old);
+  ContactGeometry g = h->geometry;
+  g.overlap -= p.shift;
+  take_over(law, g, of_wall, of_body, step_.dt, std::min(1.0, before / weight) * load(old.spring), &state);
+  book(stored_energy(scaled(all, std::abs(before)), old).tangential_spring -
+           stored_energy(law, state).tangential_spring,
+       -1 - h->number, body);
+  block.set(lane, kStateField, kContactStateSize, &state);
+}
+
+// Shares `left`, the energy of contacts that ended, among a body's contacts.
+void ContactStages::balance(int body, Holding* holdings, int count, double left) {
+  double begun = 0, held = 0, shifted = 0;
+  for (int k = 0; k < count; ++k) {
+    Holding& h = holdings[k];
+    if (h.negative) {
+      left += h.begins ? h.unit : 0;
+    } else {
+      h.target = h.begins ? h.unit : h.energy;
+      (h.begins ? begun : held) += h.target;
+      shifted += h.begins ? 0 : std::max(0.0, h.unit - h.energy);
+    }
+  }
+  left -= begun;
+  const auto share = [&](double all, auto&& part) {
+    const double given = std::clamp(left, -all, all);
+    if (!(all > 0) || given == 0) return;
+    for (int k = 0; k < count; ++k)
+      if (!holdings[k].negative) holdings[k].target += given / all * part(holdings[k]);
+    left -= given;
+  };
+  const auto begins = [](const Holding& h) { return h.begins ? h.unit : 0; };
+  const auto holds = [](const Holding& h) { return h.begins ? 0 : h.energy; };
+  const auto lacks = [](const Holding& h) { return h.begins ? 0 : std::max(0.0, h.unit - h.energy); };
+  if (left < 0) {
+    share(begun, begins);
+    share(held, holds);
+  } else {
+    share(shifted, lacks);
+    share((kStiffest - 1) * begun, [&](const Holding& h) { return (kStiffest - 1) * begins(h); });
+    const auto room = [&](const Holding& h) {
+      return h.begins || !(h.energy > 0) ? 0 : std::max(0.0, kStiffest * h.unit - h.target);
+    };
+    double rest = 0;
+    for (int k = 0; k < count; ++k)
+      if (!holdings[k].negative) rest += room(holdings[k]);
+    share(rest, room);
+  }
+  for (int k = 0; k < count; ++k) {
+    Holding& h = holdings[k];
+    if (!h.negative && (h.begins || h.target != h.energy)) hold(&h, body, h.target);
+  }
+  if (step_.model == nullptr && count > 0) book(left, -1 - holdings[0].number, body);
+}
+
+// Before the contacts found are made those of this step: `number` has the one that each is now, `known`
+// whether it was there before; `left` is what those held that are not found again.
+void ContactStages::balance_found(int body, WallContact* found, const std::int32_t* number, const bool* known,
+                                  int count, double left) {
+  Holding holdings[kMostListed];
+  const BodyRecord& b = record(body);
+  bool change = left != 0;
+  for (int k = 0; k < count && !step_.setup; ++k) {
+    Holding& h = holdings[k];
+    const WallContact& f = found[k];
+    Partner& p = partner(number[k]);
+    ContactBlock& block = pool_.block(number[k]);
+    const int lane = ContactPool::lane(number[k]);
+    h = Holding{};
+    h.number = number[k];
+    h.negative = f.weight < 0;
+    if (h.negative) block.field[kWeight][lane] = f.weight;
+    const Vec3 middle = 0.5 * (f.result.point_a + f.result.point_b);
+    h.geometry = {-f.result.gap, f.result.normal, middle - load(p.record.x), middle - load(b.x)};
+    FlatContact* flat = pool_.flat(number[k]);
+    h.begins = !known[k] || !same_piece(number[k], body, f);
+    if (h.begins) {
+      if (known[k]) left += leaving_energy(number[k], body);
+      const Vec3 velocity = load(b.velocity) + load(b.spin).cross(h.geometry.arm_b) - f.velocity;
+      if (!known[k] && -f.result.gap <= kArrival * step_.dt * velocity.norm() + kSamePlane * b.radius) {
+        h.begins = false;  // it came to the surface in this step
+      }
+      change = change || h.begins;
+    } else {
+      p.shift = std::max(0.0, std::min(p.shift, -f.result.gap));
+      if (flat && f.region) {  // the wall may have moved
+        store(f.region->normal, flat->polygon.normal);
+        flat->polygon.offset = f.region->normal.dot(f.region->origin - load(p.record.x)) - p.shift;
+      }
+      stand_closer(number[k], body, h.geometry);
+    }
+  }
+  if (change && !step_.setup) {
+    for (int k = 0; k < count; ++k) {
+      Holding& h = holdings[k];
+      if (const FlatContact* flat = pool_.flat(h.number)) {
+        h.energy = polygon_energy(h.number, body, 0);
+        h.unit = h.energy / flat->polygon.factor;
+        continue;
+      }
+      const ContactBlock& block = pool_.block(h.number);
+      h.unit = unit_energy(h.number, body, h.geometry);
+      ContactGeometry now = h.geometry;
+      now.overlap -= partner(h.number).shift;
+      h.energy = std::abs(block.field[kWeight][ContactPool::lane(h.number)]) *
+                 (now.overlap == h.geometry.overlap ? h.unit : unit_energy(h.number, body, now));
+    }
+    balance(body, holdings, count, left);
+  }
+  for (int k = 0; k < count; ++k) stand_back(number[k], &found[k]);
+}
+
+// Under a body at rest the wall comes back.
+void ContactStages::stand_closer(std::int32_t number, int body, const ContactGeometry& g) {
+  Partner& p = partner(number);
+  if (p.shift == 0) return;
+  const double way = kRelaxation * p.shift;
+  const ContactBlock& block = pool_.block(number);
+  const int lane = ContactPool::lane(number);
+  double energy = 0;
+  if (FlatContact* flat = pool_.flat(number)) {
+    for (int k = 0; k < flat->polygon.count; ++k) {
+      ContactState state;
+      flat->points.get(k, kStateField, kContactStateSize, &state);
+      if (state.active != 0 && !rests(state)) return;
+    }
+    energy = polygon_energy(number, body, -way) - polygon_energy(number, body, 0);
+    flat->polygon.offset += way;
+  } else {
+    ContactState state;
+    block.get(lane, kStateField, kContactStateSize, &state);
+    if (!rests(state)) return;
+    ContactGeometry before = g, after = g;
+    before.overlap -= p.shift;
+    after.overlap -= p.shift - way;
+    energy = block.field[kWeight][lane] * (unit_energy(number, body, after) - unit_energy(number, body, before));
+  }
+  p.shift -= way;
+  if (step_.model == nullptr) book(-energy, -1 - number, body);
+}
+
+// The wall as the contact feels it.
+void ContactStages::stand_back(std::int32_t number, WallContact* found) {
+  Partner& p = partner(number);
+  ContactResult& r = found->result;
+  p.name = found->name;
+  p.level = r.normal.dot(r.point_a);
+  if (p.shift == 0) return;
+  r.gap += p.shift;
+  r.upper += p.shift;  // the lower bound stays: the body has not left the wall
+  r.point_a -= p.shift * r.normal;
+  if (found->region) found->region->origin -= p.shift * found->region->normal;
+}
+
+}  // namespace nurbs
