@@ -137,6 +137,12 @@ class SurfaceSearch {
     return true;
   }
 
+  bool stood_on(const Vec3& normal) const {
+    for (int k = 0; k < former_count_; ++k)
+      if (former_[k].normal.dot(normal) > kSamePlane) return true;
+    return false;
+  }
+
   // Lower bound of the gap to the cells of a plane: along the line from the point of a cell that is nearest
   // to the body's centre, by the atlas.
   double clearance(const MeshPatch::Plane& plane) const {
@@ -185,14 +191,15 @@ class SurfaceSearch {
       plane.expiry = path_ + (1 - 1e-12) * (std::abs(height) - radius_);
       return false;
     }
-    if (plane.cells > 0 && plane.cells <= kFewCells) {
+    met.normal = height < 0 ? Vec3(-plane.normal) : plane.normal;
+    // A corner that came under a cell from beside it need not meet the cell itself, but stays its contact.
+    if (plane.cells > 0 && plane.cells <= kFewCells && !(edged(*particle_.shape) && stood_on(met.normal))) {
       const double clear = clearance(plane);
       if (clear > 0) {
         plane.expiry = path_ + (1 - 1e-12) * clear;
         return false;
       }
     }
-    met.normal = height < 0 ? Vec3(-plane.normal) : plane.normal;
     PairMemory& memory = met.memory;
     if (const PairMemory* from = start_for(met.normal)) {
       memory = *from;
@@ -308,18 +315,23 @@ class SurfaceSearch {
   // A corner of the body sharper than its overlap is deep: f has no maximum between the planes, and the
   // shallower one takes over at once.
   FeatureContact pointed(const MeshPatch::Edge& e) const {
-    FeatureContact f;
-    f.gap = -kFarAway;
+    const ActivePlane* shallowest = nullptr;
     for (int i = e.first_side; i < e.first_side + e.sides; ++i) {
       const ActivePlane& met = planes_[patch_.cells()[patch_.side(i).cell].plane];
-      if (!(met.result.gap > f.gap)) continue;
-      f.touching = true;
-      f.gap = met.result.gap;
-      f.normal = met.normal;
-      f.on_body = met.deepest;
-      f.where = warm_point(met.memory.on_b, *particle_.shape);
+      if (!shallowest || met.result.gap > shallowest->result.gap) shallowest = &met;
     }
+    FeatureContact f = at_plane(*shallowest);
     f.along = e.direction.dot(particle_.x + f.on_body - patch_.vertices()[e.v[0]].x);
+    return f;
+  }
+
+  FeatureContact at_plane(const ActivePlane& met) const {
+    FeatureContact f;
+    f.touching = true;
+    f.gap = met.result.gap;
+    f.normal = met.normal;
+    f.on_body = met.deepest;
+    f.where = warm_point(met.memory.on_b, *particle_.shape);
     return f;
   }
 
@@ -350,9 +362,10 @@ class SurfaceSearch {
     }
     Range r;
     SurfacePoint start;
-    const FeatureContact f = range(e, &r) ? find_line_contact(particle_, a, e.direction, r.low, r.high, 0,
-                                                              point_for(r.low, &start))
-                                          : pointed(e);
+    const bool smooth = range(e, &r);
+    const FeatureContact f =
+        smooth ? find_line_contact(particle_, a, e.direction, r.low, r.high, 0, point_for(r.low, &start))
+               : pointed(e);
     MetEdge& met = edges_[number];
     met.state = !f.touching             ? MetEdge::clear
                 : !(f.along > 0)        ? MetEdge::before
@@ -361,7 +374,8 @@ class SurfaceSearch {
     if (met.state != MetEdge::along) return;
     if (e.sides == 1 && covered(f, patch_.side(e.first_side).cell)) return;
     const auto triangle = [&](int i) { return patch_.cells()[patch_.side(e.first_side + i).cell].triangle; };
-    add_feature(f, weight, triangle(0), SurfaceContact::edge, triangle(0), e.sides > 1 ? triangle(1) : -1);
+    add_feature(f, weight, triangle(0), smooth ? SurfaceContact::edge : SurfaceContact::under_edge,
+                triangle(0), e.sides > 1 ? triangle(1) : -1);
   }
 
   // Whether a point of a border lies within another cell: meshes that overlap themselves have no border
@@ -396,6 +410,9 @@ class SurfaceSearch {
       if (!met.active || met.claimed) return;
       if (!shallowest || met.result.gap > shallowest->result.gap) shallowest = &met;
     }
+    if (edged(*particle_.shape) && lies_under(number))
+      return add_feature(at_plane(*shallowest), 1, patch_.cells()[patch_.cell_at(v.first_cell)].triangle,
+                         SurfaceContact::under_vertex, v.triangle, v.corner);
     for (int i = 0; i < v.edges; ++i)
       if (state(patch_.edge_at(v.first_edge + i)) == MetEdge::clear) return;
     SurfacePoint start;
@@ -412,6 +429,22 @@ class SurfaceSearch {
     if (weight == 0) return;
     add_feature(f, weight, patch_.cells()[patch_.cell_at(v.first_cell)].triangle, SurfaceContact::vertex,
                 v.triangle, v.corner);
+  }
+
+  // Whether a corner of the body is in a pit below a vertex: beyond the ends of all its edges, so that no
+  // triangle or edge has it.
+  bool lies_under(int number) const {
+    const MeshPatch::Vertex& v = patch_.vertices()[number];
+    for (int i = 0; i < v.edges; ++i) {
+      const MeshPatch::Edge& e = patch_.edges()[patch_.edge_at(v.first_edge + i)];
+      if (e.sides < 2) return false;
+      const Vec3 away = e.v[0] == number ? e.direction : Vec3(-e.direction);
+      for (int k = 0; k < v.cells; ++k) {
+        const ActivePlane& met = planes_[patch_.cells()[patch_.cell_at(v.first_cell + k)].plane];
+        if (away.dot(particle_.x + met.deepest - v.x) > 0) return false;
+      }
+    }
+    return true;
   }
 
   // Edges within a plane are not met.

@@ -34,10 +34,10 @@ struct SurfaceContact {
   int triangle = -1;            // one that has the point, as numbered in the patch
   int plane = -1;               // of the patch, for faces; else -1
   // The piece of the wall: a plane and its leading triangle, an edge and the first two at it, a vertex as a
-  // triangle and its corner.
-  enum Piece { face, edge, vertex } piece = face;
+  // triangle and its corner. `under`: below a valley's edge or vertex, by the shallower plane.
+  enum Piece { face, edge, vertex, under_edge, under_vertex } piece = face;
   int of[2] = {-1, -1};
-  bool flat = false;            // a flat face, crease or ruled line stands on the plane
+  bool flat = false;  // a flat face, crease or ruled line stands on the plane
   Rung rung = Rung::none;
   int iterations = 0;
   bool converged = true;
@@ -71,9 +71,9 @@ inline bool edged(const Shape& shape) {
 void plane_region(const MeshPatch& patch, int plane, const Vec3& body, PlaneRegion* region);
 
 // A body whose flat face, crease or ruled line stands on a plane has one contact with all of that plane, and
-// none with its edges: contact_polygon.h has the points. Where a body is sharper than its overlap is deep, gaps
-// at edges are no critical values, and nothing is taken off: its contacts come and go at finite overlap, and
-// scene/wall_energy.cpp sees to it that their energies add up.
+// none with its edges: contact_polygon.h has the points. Where a body is sharper than its overlap is deep,
+// gaps at edges are no critical values, and nothing is taken off: its contacts come and go at finite overlap,
+// and scene/wall_energy.cpp sees to it that their energies add up.
 //
 // `path`: the body's and the wall's, as in Bodies::path; planes that the body is proven clear of are not
 // looked at before it has gone far enough. `former`: contacts of the last step, whose memory is gone on from.

@@ -127,8 +127,8 @@ class ContactStages {
   void begin_step(const Step& step);
   // What came of the last step's contacts is carried over to those of this one by place and normal, whatever
   // part of the wall they were on; those without a successor are closed. `balanced`: contacts that come or go
-  // at finite overlap neither bring nor, if it can be helped, take energy (wall_energy.cpp); `found` is changed
-  // accordingly.
+  // at finite overlap neither bring nor, if it can be helped, take energy (wall_energy.cpp); `found` is
+  // changed accordingly.
   void give(int body, std::int32_t* head, WallContact* found, int count, bool balanced = false);
   void end_step(double neighbours);
   // The memory of a body's contacts and their normals, where the next search goes on; how many.
@@ -263,6 +263,7 @@ class ContactStages {
   double polygon_energy(std::int32_t number, int body, double shift);
   double leaving_energy(std::int32_t number, int body);
   bool same_piece(std::int32_t number, int body, const WallContact& found) const;
+  bool jumps(std::int32_t number, int body, const WallContact& found) const;
   PolygonState polygon_state(const ContactPolygon& polygon, int b, const Vec3& wall, int a) const;
   void balance_found(int body, WallContact* found, const std::int32_t* number, const bool* known, int count,
                      double left);

@@ -80,7 +80,8 @@ static PolygonState now(const ContactPolygon& polygon, const Bodies& bodies, con
   return evaluate(polygon, a < 0 ? plane_frame(wall) : frame(a), frame(b));
 }
 
-PolygonState ContactStages::polygon_state(const ContactPolygon& polygon, int b, const Vec3& wall, int a) const {
+PolygonState ContactStages::polygon_state(const ContactPolygon& polygon, int b, const Vec3& wall,
+                                          int a) const {
   return now(polygon, *step_.bodies, wall, a, b);
 }
 
@@ -198,7 +199,7 @@ void ContactStages::relax_factor(const ContactBlock& block, int lane, FlatContac
   for (int k = 0; k < state.count; ++k) {
     ContactState point;
     flat.points.get(k, kStateField, kContactStateSize, &point);
-    if (before < 1 && !rests(point)) return;
+    if (!rests(point)) return;
     tangential += flat.polygon.weight[k] * stored_energy(law, point).tangential_spring;
   }
   double energy = law.kn * relax(flat.polygon, state, kRelaxation);
@@ -214,9 +215,10 @@ bool ContactStages::remake(ContactBlock& block, int lane, FlatContact& flat, Pol
   if (!find_polygon(a, b, state.normal, overlap, kKeptReach * overlap, &flat.polygon, &polygon)) return false;
   polygon.factor = flat.polygon.factor;
   const PolygonState fresh = now(polygon, *step_.bodies, wall_frame(a), a, b);
-  // Springs may lose energy here, which is booked, but gain none.
+  // Springs keep their energy; what would make them too stiff they lose, which is booked.
   const double held = stored_energy(flat.polygon, state), holds = stored_energy(polygon, fresh);
-  if (holds > held) polygon.factor *= held / holds;
+  if (holds > 0)
+    polygon.factor = std::min(polygon.factor * held / holds, std::max(kStiffest, polygon.factor));
   int source[kContactPoints];
   match(flat.polygon, state, polygon, fresh, source);
   if (step_.model != nullptr) {
@@ -336,7 +338,7 @@ void ContactStages::relax_weight(ContactBlock& block, int lane, double gap) {
   }
   ContactState state;
   block.get(lane, kStateField, kContactStateSize, &state);
-  if (weight < 1 && (step_.model != nullptr || !rests(state))) return;
+  if (!rests(state) || (weight < 1 && step_.model != nullptr)) return;
   const double change = kRelaxation * (1 - weight);
   weight += change;
   if (step_.model != nullptr) return;  // what its springs give up is missing at the next step's balance

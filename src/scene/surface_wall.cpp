@@ -171,8 +171,9 @@ std::uint64_t SurfaceWall::name_of(const SurfaceContact& c, int body,
     const Near& n = near_[chosen[triangle]];
     return 1 + static_cast<std::uint64_t>(meshes[n.mesh].id[n.triangle]);
   };
-  const std::uint64_t second = c.piece == SurfaceContact::vertex ? c.of[1] : id(c.of[1]);
-  return (second << 35) ^ (id(c.of[0]) << 6) ^ static_cast<std::uint64_t>(near.mesh << 2 | c.piece);
+  const bool vertex = c.piece == SurfaceContact::vertex || c.piece == SurfaceContact::under_vertex;
+  const std::uint64_t second = vertex ? c.of[1] : id(c.of[1]);
+  return (second << 35) ^ (id(c.of[0]) << 7) ^ static_cast<std::uint64_t>(near.mesh << 3 | c.piece);
 }
 
 // Bodies move little between two lists of neighbours: triangles further away than kMargin are left for later.

@@ -6,21 +6,23 @@
 //  - One that begins with less than its overlap makes has the wall *stand back* from it by a shift, in which
 //    nothing is felt: it is as stiff as any other, and it gives back what it took. The shift goes when the
 //    body comes out of it, and slowly under a body at rest.
-//  - One that begins with more is stiffer by a weight, as a corner's is that comes down flat (flat_stage.cpp).
+//  - One that begins with more is stiffer by a weight, as a corner's is that comes down flat
+//  (flat_stage.cpp).
 //  - A contact that begins at its surface, and one that opens there, hold nothing, and nothing is shared.
 // What finds no place is booked as damping. Friction springs go along as far as they lose by it.
+#include "scene/wall_energy.h"
+
 #include <algorithm>
 #include <cmath>
 
 #include "scene/contact_results.h"
-#include "scene/wall_energy.h"
 
 namespace nurbs {
 namespace {
 
 constexpr double kSamePlane = 1e-9;  // of normals, and of the bounding radius: two planes are one
 constexpr double kArrival = 1.1;     // ways of a step that a contact which begins at its surface is deep
-constexpr std::uint64_t kPiece = 3;  // bits of a name that say plane, edge or vertex; planes are 0
+constexpr std::uint64_t kPiece = 7;  // bits of a name that say plane, edge or vertex; planes are 0
 
 bool rests(const ContactState& state) {
   return state.active != 0 && std::abs(state.rate) * state.dt < kResting * state.overlap;
@@ -112,6 +114,19 @@ bool ContactStages::same_piece(std::int32_t number, int body, const WallContact&
          std::abs(now.dot(found.result.point_a) - p.level) < kSamePlane * record(body).radius;
 }
 
+// Whether a contact's overlap is another one than the body's motion can have made of the last.
+bool ContactStages::jumps(std::int32_t number, int body, const WallContact& found) const {
+  const Partner& p = partners_[number - 1];
+  const BodyRecord& b = record(body);
+  const ContactBlock& block = pool_.blocks()[(number - 1) / kBlock];
+  ContactState state;
+  block.get(ContactPool::lane(number), kStateField, kContactStateSize, &state);
+  if (state.active == 0) return false;
+  const double way = step_.dt * ((load(b.velocity) - found.velocity).norm() +
+                                 b.radius * (load(b.spin).norm() + found.spin.norm()));
+  return std::abs(-found.result.gap - p.shift - state.overlap) > kArrival * way + kSamePlane * b.radius;
+}
+
 // Gives a contact an energy, by the wall's shift or its weight.
 void ContactStages::hold(Holding* h, int body, double energy) {
   Partner& p = partner(h->number);
@@ -134,9 +149,7 @@ void ContactStages::hold(Holding* h, int body, double energy) {
   const double before = weight;
   const int sign = weight < 0 ? -1 : 1;
   weight = sign * std::max(1.0, h->unit > 0 ? energy / h->unit : 1.0);
-  p.shift = energy < h->unit
-                ? h->geometry.overlap - overlap_of(h->number, body, h->geometry, energy)
-                : 0;
+  p.shift = energy < h->unit ? h->geometry.overlap - overlap_of(h->number, body, h->geometry, energy) : 0;
   if (weight == before || step_.model != nullptr) return;
   // The friction spring keeps its force, but gains no energy.
   ContactState old, state{};
@@ -196,7 +209,7 @@ void ContactStages::balance(int body, Holding* holdings, int count, double left)
     Holding& h = holdings[k];
     if (!h.negative && (h.begins || h.target != h.energy)) hold(&h, body, h.target);
   }
-  if (step_.model == nullptr && count > 0) book(left, -1 - holdings[0].number, body);
+  if (step_.model == nullptr) book(left, -1, body);
 }
 
 // Before the contacts found are made those of this step: `number` has the one that each is now, `known`
@@ -219,7 +232,7 @@ void ContactStages::balance_found(int body, WallContact* found, const std::int32
     const Vec3 middle = 0.5 * (f.result.point_a + f.result.point_b);
     h.geometry = {-f.result.gap, f.result.normal, middle - load(p.record.x), middle - load(b.x)};
     FlatContact* flat = pool_.flat(number[k]);
-    h.begins = !known[k] || !same_piece(number[k], body, f);
+    h.begins = !known[k] || !same_piece(number[k], body, f) || jumps(number[k], body, f);
     if (h.begins) {
       if (known[k]) left += leaving_energy(number[k], body);
       const Vec3 velocity = load(b.velocity) + load(b.spin).cross(h.geometry.arm_b) - f.velocity;
@@ -279,7 +292,8 @@ void ContactStages::stand_closer(std::int32_t number, int body, const ContactGeo
     ContactGeometry before = g, after = g;
     before.overlap -= p.shift;
     after.overlap -= p.shift - way;
-    energy = block.field[kWeight][lane] * (unit_energy(number, body, after) - unit_energy(number, body, before));
+    energy =
+        block.field[kWeight][lane] * (unit_energy(number, body, after) - unit_energy(number, body, before));
   }
   p.shift -= way;
   if (step_.model == nullptr) book(-energy, -1 - number, body);

@@ -17,8 +17,8 @@ constexpr double kStiffest = 8;    // factor or weight of a contact; four is wha
 // A contact of a body in the balance.
 struct ContactStages::Holding {
   std::int32_t number = 0;
-  bool begins = false;    // with this piece of the wall, at a finite overlap
-  bool negative = false;  // takes others off
+  bool begins = false;       // with this piece of the wall, at a finite overlap
+  bool negative = false;     // takes others off
   ContactGeometry geometry;  // before the wall stands back
   double unit = 0;           // energy without shift, at weight 1
   double energy = 0;         // as it is

@@ -9,9 +9,8 @@
 namespace nurbs {
 namespace {
 
-constexpr double kSameSide = 0.7;  // cosine between normals: 45 degrees
-constexpr int kListedSize =
-    10 + kProofSize;  // doubles of a listed contact beside its record: see pack_list
+constexpr double kSameSide = 0.7;             // cosine between normals: 45 degrees
+constexpr int kListedSize = 10 + kProofSize;  // doubles of a listed contact beside its record: see pack_list
 
 }  // namespace
 
