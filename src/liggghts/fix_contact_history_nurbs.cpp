@@ -116,6 +116,32 @@ void FixContactHistoryNurbs::recall(int i, int tag, nurbs::PairProof* to) const 
     }
 }
 
+// From A to B, of what is remembered; 0 where nothing says it.
+nurbs::Vec3 FixContactHistoryNurbs::direction(const nurbs::PairProof& proof) const {
+  nurbs::ContactPool& contacts = pool();
+  if (contacts.holds(proof.contact)) {
+    double normal[3];
+    const nurbs::FlatContact* flat = contacts.flat(proof.contact);
+    const nurbs::ContactBlock& block = flat ? flat->points : contacts.block(proof.contact);
+    for (int lane = 0; lane < nurbs::kBlock; ++lane) {
+      if (!flat && lane != nurbs::ContactPool::lane(proof.contact)) continue;
+      block.get(lane, nurbs::kStateField + 3, 3, normal);
+      if (nurbs::load(normal).squaredNorm() > 0) return nurbs::load(normal);
+    }
+  }
+  return nurbs::load(proof.direction);
+}
+
+void FixContactHistoryNurbs::recall(int i, int tag, const nurbs::Vec3& way, nurbs::PairProof* to) const {
+  double most = -1e300;
+  for (int n = 0; n < npartner_[i]; ++n) {
+    if (partner_[i][n] != tag) continue;
+    const double along = direction(proof(i, n)).dot(way);
+    if (along > most) most = along, *to = proof(i, n);
+  }
+  if (most <= 0) *to = nurbs::PairProof{};  // of other images
+}
+
 int FixContactHistoryNurbs::contacts_size(int i) const {
   int size = 0;
   for (int n = 0; n < npartner_[i]; ++n)

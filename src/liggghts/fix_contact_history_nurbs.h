@@ -37,6 +37,8 @@ class FixContactHistoryNurbs : public FixContactHistory {
   // What owned particle i remembered of the particle `tag` when the neighbour lists were last made; the host
   // forgets it where the bounding spheres are apart. Nothing when it remembered nothing.
   void recall(int i, int tag, nurbs::PairProof* to) const;
+  // The same where there may be several images of it: `way`, from the lower tag's centre to the other's.
+  void recall(int i, int tag, const nurbs::Vec3& way, nurbs::PairProof* to) const;
 
  protected:
   void allocate_pages() override;
@@ -48,6 +50,7 @@ class FixContactHistoryNurbs : public FixContactHistory {
   void for_each_neighbour(Flag flag) const;
 
   nurbs::PairProof& proof(int i, int n) const;
+  nurbs::Vec3 direction(const nurbs::PairProof& proof) const;
   nurbs::ContactPool& pool() const;
   int contacts_size(int i) const;
   int put_contacts(int i, double* buffer) const;

@@ -46,7 +46,10 @@ FixWallNurbs::FixWallNurbs(LAMMPS* lmp, int narg, char** arg) : Fix(lmp, narg, a
   if (kind != "plane" && kind != "cylinder" && kind != "mesh")
     fail_all(FLERR, lmp,
              "Fix wall/nurbs: kind of wall " + (kind.empty() ? "is missing;" : kind) +
-                 " must be plane, cylinder or mesh");
+                 " must be plane, cylinder or mesh" +
+                 (kind == "primitive" ? "; for primitive type T zplane C write plane 0 0 C 0 0 1 type T, for "
+                                        "zcylinder R C1 C2 write cylinder z R C1 C2 type T"
+                                      : ""));
   const int first = kind == "plane"      ? parse_plane(narg, arg)
                     : kind == "cylinder" ? parse_cylinder(narg, arg)
                                          : parse_mesh(narg, arg);
@@ -141,6 +144,10 @@ void FixWallNurbs::parse_law(int first, int narg, char** arg) {
     if (nurbs_host::HostModels::named_by(narg - first, arg + first))
       fail_all(FLERR, lmp,
                std::string("Fix wall/nurbs: type T, the wall's atom type, must stand before ") + arg[first]);
+    if (narg <= first)
+      fail_all(FLERR, lmp,
+               "Fix wall/nurbs needs a law behind the wall: kn KN kt KT [cn CN] [ct CT] mu MU, or type T model "
+               "NORMAL ..");
     law_ = nurbs_host::parse_coefficients(lmp, "Fix wall/nurbs", first, narg, arg);
     return;
   }
@@ -239,8 +246,13 @@ void FixWallNurbs::warn_time_step() {
 }
 
 void FixWallNurbs::setup(int vflag) {
+  checked_particles_ = atom->natoms;
   post_force(vflag);
-  nurbs_host::warn_deep(lmp, stages_.deep(), std::string("Fix wall/nurbs ") + id,
+  warn_deep("at the start of the run");
+}
+
+void FixWallNurbs::warn_deep(const char* when) {
+  nurbs_host::warn_deep(lmp, stages_.deep(), std::string("Fix wall/nurbs ") + id, when,
                         "do particles reach through the wall, or is its normal reversed?",
                         last_deep_warning_);
 }
@@ -425,6 +437,10 @@ void FixWallNurbs::post_force(int) {
     step.wall = &wall_;
     step.wall_normal = normal_;
     stages_.compute(step);
+  }
+  if (neighbor->ago == 0 && atom->natoms > checked_particles_) {
+    checked_particles_ = atom->natoms;
+    warn_deep("after an insertion");
   }
   for (const int i : stages_.loaded()) {
     const nurbs::ContactStages::Sum sum = stages_.sum(i);

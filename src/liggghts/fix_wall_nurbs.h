@@ -105,6 +105,7 @@ class FixWallNurbs : public Fix {
   int contacts_size(int i) const;
   void warn_periodic();
   void warn_time_step();
+  void warn_deep(const char* when);
 
   using Kind = nurbs::SurfaceWall::Kind;
   Kind kind_ = Kind::plane;
@@ -128,6 +129,7 @@ class FixWallNurbs : public Fix {
   bool ledger_ = false;
   bool was_another_kind_ = false;  // in the restart that is read
   bool periodic_warned_ = false;
+  bigint checked_particles_ = 0;  // when deep contacts were last looked for
   std::string last_warning_, last_deep_warning_;
 };
 

@@ -280,6 +280,9 @@ void HostModels::build(int narg, char** arg) {
         fail_all(FLERR, lmp_,
                  user_ + ": " + c.kind +
                      " is out of order; the order is model tangential cohesion rolling_friction");
+    for (const char* first : {"tolerance", "solver", "radius"})
+      if (std::strcmp(arg[k], first) == 0)
+        fail_all(FLERR, lmp_, user_ + ": " + first + " must stand before model");
     if (k + 1 == narg) fail_all(FLERR, lmp_, user_ + ": setting " + arg[k] + " needs a value");
     if (refused_setting(arg[k]) && std::strcmp(arg[k + 1], "off") != 0)
       fail_all(FLERR, lmp_,

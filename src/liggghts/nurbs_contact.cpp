@@ -105,8 +105,8 @@ Vec3 box_edge(const Domain& domain, int k) {
   return {domain.triclinic ? domain.xz : 0, domain.triclinic ? domain.yz : 0, domain.zprd};
 }
 
-void warn_deep(LAMMPS* lmp, const nurbs::DeepContacts& mine, const std::string& user, const std::string& hint,
-               std::string& last) {
+void warn_deep(LAMMPS* lmp, const nurbs::DeepContacts& mine, const std::string& user, const std::string& when,
+               const std::string& hint, std::string& last) {
   nurbs::DeepContacts all;
   MPI_Allreduce(&mine.count, &all.count, 1, MPI_DOUBLE, MPI_SUM, lmp->world);
   MPI_Allreduce(&mine.deepest, &all.deepest, 1, MPI_DOUBLE, MPI_MAX, lmp->world);
@@ -115,7 +115,7 @@ void warn_deep(LAMMPS* lmp, const nurbs::DeepContacts& mine, const std::string& 
   std::snprintf(numbers, sizeof numbers,
                 "contacts deeper than %g %% of the bounding radius: %.0f, deepest %.3g %%",
                 100 * nurbs::DeepContacts::kDepth, all.count, 100 * all.deepest);
-  warn_news(FLERR, lmp, user + ": at the start of the run " + numbers + "; " + hint, last);
+  warn_news(FLERR, lmp, user + ": " + when + " " + numbers + "; " + hint, last);
 }
 
 bool wants_ledger(const LAMMPS* lmp) {

@@ -53,6 +53,8 @@ void PairGranNurbs::settings(int narg, char** arg) {
       models = std::make_unique<nurbs_host::HostModels>(lmp, "Pair style gran/nurbs", 0, narg - k, arg + k);
       break;
     }
+    if (keyword == "tangential" || keyword == "cohesion" || keyword == "rolling_friction")
+      fail_all(FLERR, lmp, "Pair style gran/nurbs: model NORMAL must stand before " + keyword);
     if (keyword != "tolerance" && keyword != "solver")
       fail_all(FLERR, lmp,
                "Pair style gran/nurbs: unknown keyword " + keyword +
@@ -163,24 +165,22 @@ void PairGranNurbs::init_style() {
   for (size_t k = 0; k < laws_.size(); ++k)
     if (laws_[k]) law_table_[k] = *laws_[k];
   ledger_ = nurbs_host::wants_ledger(lmp);
-  warn_short_box();
   warn_time_step();
 }
 
-// Two particles can touch twice, across a short periodic edge, but have one history.
-void PairGranNurbs::warn_short_box() {
-  double mine = 0, largest = 0;
-  for (int i = 0; i < atom->nlocal; ++i) mine = std::max(mine, atom->radius[i]);
-  MPI_Allreduce(&mine, &largest, 1, MPI_DOUBLE, MPI_MAX, world);
-  for (int k = 0; k < 3 && !short_box_warned_; ++k) {
-    const double length = nurbs_host::box_edge(*domain, k).norm();
-    if (!domain->periodicity[k] || length >= 4 * largest) continue;
-    short_box_warned_ = true;
-    nurbs_host::warn(FLERR, lmp,
-                     std::string("Pair gran/nurbs: the periodic box is ") + nurbs_host::show(length) +
-                         " long in " + "xyz"[k] + "; two largest bounding diameters, " +
-                         nurbs_host::show(4 * largest) +
-                         ", are needed, or two particles that touch twice share one contact history");
+// Across a short periodic edge two particles, or one and its image, can touch twice: each is a contact of its
+// own. What is remembered goes by the partner's number alone; of several it is that whose normal points the
+// way of this image, not what the host may have found first.
+void PairGranNurbs::recall_images(int i) {
+  const auto& history = static_cast<const FixContactHistoryNurbs&>(*fix_history);
+  const int *tag = atom->tag, count = list->numneigh[i];
+  auto* proofs = reinterpret_cast<nurbs::PairProof*>(listgranhistory->firstdouble[i]);
+  const auto partner = [&](int jj) { return list->firstneigh[i][jj] & NEIGHMASK; };
+  for (int jj = 0; jj < count; ++jj) {
+    const int j = partner(jj);
+    const Vec3 way = Vec3Map(atom->x[j]) - Vec3Map(atom->x[i]);
+    proofs[jj] = nurbs::PairProof{};
+    history.recall(i, tag[j], tag[j] < tag[i] ? Vec3(-way) : way, proofs + jj);
   }
 }
 
@@ -214,11 +214,17 @@ void PairGranNurbs::warn_time_step() {
 // A pair is solved in tag order, so that ranks that both own half of it compute the same bits.
 void PairGranNurbs::hand_in_neighbours() {
   stages_.begin_neighbours();
+  double shortest = nurbs::kFarAway, radius = 0;
+  for (int k = 0; k < 3; ++k)
+    if (domain->periodicity[k]) shortest = std::min(shortest, nurbs_host::box_edge(*domain, k).norm());
+  for (int i = 0; i < atom->nlocal + atom->nghost; ++i) radius = std::max(radius, atom->radius[i]);
+  const bool short_box = shortest < 4 * radius + 2 * neighbor->skin;
   const auto& history = static_cast<const FixContactHistoryNurbs&>(*fix_history);
   const int* tag = atom->tag;
   for (int ii = 0; ii < list->inum; ++ii) {
     const int i = list->ilist[ii];
     auto* proofs = reinterpret_cast<nurbs::PairProof*>(listgranhistory->firstdouble[i]);
+    if (short_box) recall_images(i);
     for (int jj = 0; jj < list->numneigh[i]; ++jj) {
       const int j = list->firstneigh[i][jj] & NEIGHMASK;
       if (proofs[jj].stamp == 0) history.recall(i, tag[j], proofs + jj);
@@ -237,7 +243,8 @@ void PairGranNurbs::compute_force(int eflag, int vflag, int addflag) {
     evflag = vflag_fdotr = 0;
   nurbs::ContactStages::Step step;
   step.bodies = &bodies_->update_bodies(freeze_group_bit_);
-  if (neighbor->ago == 0 && atom->natoms > checked_particles_) {  // inserted ones may be lighter
+  const bool inserted = neighbor->ago == 0 && atom->natoms > checked_particles_;
+  if (inserted) {  // they may be lighter
     checked_particles_ = atom->natoms;
     warn_time_step();
   }
@@ -256,8 +263,10 @@ void PairGranNurbs::compute_force(int eflag, int vflag, int addflag) {
   if (evflag || storeContactForces() || storeContactForcesStress())
     stages_.for_each_contact([this](const nurbs::ContactView& contact) { tally(contact); });
   keep_case();
-  if (step.setup)
-    nurbs_host::warn_deep(lmp, stages_.deep(), kUser, "do particles overlap?", last_deep_warning_);
+  if (step.setup || inserted)
+    nurbs_host::warn_deep(lmp, stages_.deep(), kUser,
+                          step.setup ? "at the start of the run" : "after an insertion",
+                          "do particles overlap?", last_deep_warning_);
   if (storeContactForces()) fix_contact_forces()->do_forward_comm();
   if (storeContactForcesStress()) fix_contact_forces_stress()->do_forward_comm();
 }

@@ -84,7 +84,7 @@ class PairGranNurbs : public PairGran {
   void require_host_settings();
   void warn_of_sphere_values();
   void require_all_laws();
-  void warn_short_box();
+  void recall_images(int i);
   void warn_time_step();
 
   void hand_in_neighbours();
@@ -104,7 +104,6 @@ class PairGranNurbs : public PairGran {
   nurbs::ContactStages stages_;
   bool ledger_ = false;
   bigint checked_particles_ = 0;  // when the time step was last checked
-  bool short_box_warned_ = false;
   std::string last_warning_, last_deep_warning_;
 };
 

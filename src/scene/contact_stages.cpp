@@ -285,7 +285,7 @@ void ContactStages::count(const ContactResult& r, int a, int b) {
     unresolved_.particle_b = step_.bodies->particle(b);
     if (a >= 0) unresolved_.particle_a = step_.bodies->particle(a);
   }
-  if (!step_.setup || !touches(r)) return;
+  if (!touches(r)) return;
   const double depth = -r.gap / smaller_radius(a, b);
   if (depth <= DeepContacts::kDepth) return;
   deep_.count += weight;

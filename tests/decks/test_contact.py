@@ -258,16 +258,28 @@ dump p all local 100 pgl.dump c_pgl[7] c_pgl[8] c_pgl[10] c_pgl[11] c_pgl[12] c_
                 self.assertIn(words, line)
                 self.assertIn("use boundary f", line)
 
-    def test_short_periodic_box_is_warned_of_once(self):
-        ball = (3, 2, 2, 0.025, 2500.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0)
-        for width, count in ((0.0999, 1), (0.1001, 0)):
-            data = deck.data_file([ball], box=((-0.2, 0.2), (-width / 2, width / 2), (-0.2, 0.2)), types=2)
-            text = scene(run="run 0\nrun 0").replace("boundary f f f", "boundary f p f")
-            run = deck.run_ok(text, ranks=2, files={**files(), "bodies.data": data})
-            lines = self.warnings(run, "share one contact history")
-            self.assertEqual(len(lines), count, run.screen)
-            for line in lines:
-                self.assertIn("0.0999 long in y", line)
+    def test_two_contacts_across_a_short_box(self):
+        """A row of two balls that touch on both sides turns and slides as one of four in a box twice as long."""
+        width = 0.0996
+        balls = [(0.0, 3.0), (0.5, -2.0)]  # place, spin
+
+        def row(copies):
+            atoms, moving = [], []
+            for k in range(2 * copies):
+                place, spin = balls[k % 2]
+                y = (k // 2 + place + 0.25 - 0.5 * copies) * width
+                atoms.append((k + 1, 2, 2, 0.025, 2500.0, 0.0, y, 0.1, 1.0, 0.0, 0.0, 0.0))
+                moving.append((k + 1, 0.1 * spin, 0.0, 0.0, spin, 0.0, 5 * spin))
+            box = ((-0.2, 0.2), (-width * copies / 2, width * copies / 2), (-0.2, 0.4))
+            text = scene(run="run 3000").replace("boundary f f f", "boundary f p f").replace("neighbor 0.005", "neighbor 0.002")
+            run = deck.run_ok(text, files={**files(), "bodies.data": deck.data_file(atoms, moving, box, types=2)})
+            return run.dump("out.dump")[-1][1]
+
+        short, long = row(1), row(2)
+        for name in ("x", "z", "vx", "vy", "vz", "omegax", "omegay", "omegaz"):
+            for k in range(2):
+                np.testing.assert_allclose(long[name][k::2], short[name][k], rtol=0, atol=1e-9, err_msg=name)
+        self.assertGreater(abs(short["vx"][0] - 0.3), 0.01)  # they dragged each other
 
 
     def test_deep_contacts_at_the_start_are_counted(self):

@@ -54,6 +54,37 @@ def quaternions(frame):
     return np.stack([frame[f"c_b[{k}]"] for k in (1, 2, 3, 4)], axis=1)
 
 
+class Hints(unittest.TestCase):
+    """What a deck for spheres says, or says in the wrong order, is answered with what to write."""
+
+    def test_errors_say_what_to_write(self):
+        for line, words in (
+                ("fix q all nve/sphere", "use fix nve/nurbs"),
+                ("compute q all erotate/sphere", "use compute erotate/nurbs"),
+                ("fix q all wall/nurbs primitive type 1 zplane 0.0", "write plane 0 0 C 0 0 1 type T"),
+                ("fix q all wall/nurbs plane 0 0 0 0 0 1", "or type T model NORMAL"),
+                ("pair_style gran/nurbs model hertz tolerance 1e-8", "tolerance must stand before model"),
+                ("pair_style gran/nurbs tangential history model hertz", "model NORMAL must stand before tangential")):
+            result = deck.run(DECK + line + "\nrun 0\n", files=files())
+            self.assertEqual((result.status, len(result.errors)), (1, 1), result.screen[-500:])
+            self.assertIn(words, result.errors[0])
+
+    def test_two_motions_of_the_same_particles_are_warned_of(self):
+        self.assertIn("time integrated more than once", deck.run_ok(DECK + "fix q all nve/nurbs\nrun 0\n", files=files()).screen)
+
+    def test_particles_inserted_behind_a_plane_are_warned_of(self):
+        text = DECK.replace("plane 0 0 0 0 0 1", "plane 0 0 0 0 0 -1").replace("read_data in.data", "read_data empty.data") + """
+region r block -4 4 -4 4 1 8 units box
+fix t all particletemplate/nurbs 86028121 atom_type 1 density constant 1000 shape box scale constant 1
+fix d all particledistribution/discrete 86028157 1 t 1.0
+fix i all insert/pack seed 67867967 distributiontemplate d insert_every once overlapcheck yes vel constant 0 0 0 region r particles_in_region 4
+run 2
+"""
+        far = [(1, 1, 1, 1.0, 1000.0, 5.0, 5.0, -4.0, 1.0, 0.0, 0.0, 0.0)]
+        result = deck.run_ok(text, files={**SHAPES, "empty.data": deck.data_file(far, [(1, 0, 0, 0, 0, 0, 0)], types=2, box=((-6, 6), (-6, 6), (-8, 12)))})
+        self.assertIn("normal reversed?", result.screen)
+
+
 class Set(unittest.TestCase):
     def check_sizes(self, frame):
         box = frame["c_b[5]"] == 1

@@ -205,6 +205,70 @@ class Meshes(unittest.TestCase):
         self.assertAlmostEqual(counted.thermo["mf[1]"][-1], 2500 * 4 / 3 * np.pi * 0.03 ** 3 * 0.8 * 1.2 * 1.0, delta=0.2)
 
 
+def bumpy(seed, height, n):
+    """A bowl of 2 n n triangles with bumps."""
+    random, heights = np.random.RandomState(seed), {}
+    bump = lambda x, y: heights.setdefault((x, y), random.uniform(-height, height))  # noqa: E731
+    return sheet(n, 0.19, lambda x, y: bump(x, y) + 2 * (x * x + y * y))
+
+
+class BentMeshes(unittest.TestCase):
+    """Boxes, whose contacts with a bent mesh's faces, edges and vertices come and go at finite overlap."""
+    HERTZ = "\n".join(f"fix {name} all property/global {words}" for name, words in (
+        ("m1", "youngsModulus peratomtype 5e6"), ("m2", "poissonsRatio peratomtype 0.3"),
+        ("m3", "coefficientRestitution peratomtypepair 1 1.0"), ("m4", "coefficientFriction peratomtypepair 1 0.0"))) + "\n"
+
+    @staticmethod
+    def bounce(seed, height, n, mesh=None, law="kn 1e5 kt 5e4 mu 0", before="", gravity=60, steps="run 20000", **options):
+        random = np.random.RandomState(seed)
+        turn = random.normal(size=4)
+        box = [(1, 1, 1, 0.03, 2500.0, *random.uniform(-0.05, 0.05, 2), 0.06, *(turn / np.linalg.norm(turn)))]
+        thrown = [(1, *random.uniform(-0.3, 0.3, 2), -0.5, *random.normal(size=3) * 5)]
+        return run("mesh m", box, thrown, mesh=mesh or bumpy(seed + 1000, height, n), body=deck.box_shape(1, 0.7, 0.5),
+                   before=before + MESH, law=law, dt=2e-5, gravity=f"{gravity} vector 0 0 -1", steps=steps,
+                   thermo="c_ke c_er c_mgz", **options)
+
+    @staticmethod
+    def mechanical(result, gravity=60):
+        t = result.thermo
+        return t["ke"] + t["er"] + t["mgz"] * gravity / 9.81 + t["led[1]"] + t["led[2]"]
+
+    def test_nothing_is_gained(self):
+        for seed, height, n in ((0, 1e-4, 8), (1, 1e-3, 20), (0, 1e-2, 6), (1, 1e-2, 6)):
+            for law, before in (("kn 1e5 kt 5e4 mu 0", ""), ("type 1 model hertz tangential no_history", self.HERTZ)):
+                out = self.bounce(seed, height, n, law=law, before=before)
+                energy = self.mechanical(out) / self.mechanical(out)[0]
+                self.assertLess(energy.max(), 1.002)
+                dissipated = (out.thermo["led[3]"] + out.thermo["led[4]"]) / self.mechanical(out)[0]
+                np.testing.assert_allclose(energy + dissipated, 1, rtol=0, atol=0.015)
+                if before == "":
+                    self.assertGreater(energy.min(), 0.98)
+
+    def test_the_cut_does_not_matter(self):
+        whole, fine = bumpy(7, 3e-3, 8), []
+        for a, b, c in whole:
+            middle = tuple((0.5 * np.array(a) + 0.3 * np.array(b) + 0.2 * np.array(c)).tolist())
+            fine += [(a, b, middle), (b, c, middle), (c, a, middle)]
+        one, other = (frames(self.bounce(3, 0, 0, mesh=mesh, steps="run 6000")) for mesh in (whole, fine))
+        np.testing.assert_allclose(other, one, rtol=0, atol=1e-9)
+
+    def test_ranks_and_a_restart(self):
+        options = dict(law="kn 1e5 kt 5e4 cn 30 ct 10 mu 0.3", gravity=9.81)
+        one = last(self.bounce(2, 3e-3, 12, steps="run 9000", **options))
+        self.assertEqual(last(self.bounce(2, 3e-3, 12, steps="run 9000", ranks=2, **options)), one)
+        half = self.bounce(2, 3e-3, 12, steps="run 4321\nwrite_restart half.rst", **options)
+        rest = self.bounce(2, 3e-3, 12, steps="run 4679", files={"half.rst": half.path / "half.rst"},
+                           start="newton off\ncommunicate single vel yes\nread_restart half.rst\n", **options)
+        np.testing.assert_allclose(last(rest), one, rtol=0, atol=1e-9)
+
+    def test_a_box_comes_to_rest_and_does_not_sink(self):
+        out = self.bounce(4, 3e-3, 12, law="kn 1e5 kt 5e4 cn 60 ct 20 mu 0.4", gravity=9.81, steps="run 60000")
+        self.assertLess((out.thermo["ke"] + out.thermo["er"])[-1], 1e-6 * out.thermo["ke"][0])
+        weight = 2500 * 8 * 0.35 * 0.03 ** 3 * 9.81
+        self.assertAlmostEqual(out.thermo["w[3]"][-1] / weight, -1, delta=1e-2)
+        self.assertGreater(frames(out)[-1, 0, 2], 0.012)
+
+
 class MovingWalls(unittest.TestCase):
     BALL = [(1, 1, 1, 0.03, 2500.0, 0.0, 0.0, 0.031, 0.9, 0.3, 0.1, 0.2)]
 
