@@ -16,8 +16,8 @@ namespace LAMMPS_NS {
 class ComputeERotateSphereNurbs : public ComputeERotateSphere {
  public:
   ComputeERotateSphereNurbs(LAMMPS* lmp, int& iarg, int narg, char** arg)
-      : ComputeERotateSphere(
-            nurbs_host::refuse_style(lmp, "Compute erotate/sphere", "compute erotate/nurbs"), iarg, narg, arg) {}
+      : ComputeERotateSphere(nurbs_host::refuse_style(lmp, "Compute erotate/sphere", "compute erotate/nurbs"),
+                             iarg, narg, arg) {}
 };
 
 }  // namespace LAMMPS_NS

@@ -145,9 +145,10 @@ void FixWallNurbs::parse_law(int first, int narg, char** arg) {
       fail_all(FLERR, lmp,
                std::string("Fix wall/nurbs: type T, the wall's atom type, must stand before ") + arg[first]);
     if (narg <= first)
-      fail_all(FLERR, lmp,
-               "Fix wall/nurbs needs a law behind the wall: kn KN kt KT [cn CN] [ct CT] mu MU, or type T model "
-               "NORMAL ..");
+      fail_all(
+          FLERR, lmp,
+          "Fix wall/nurbs needs a law behind the wall: kn KN kt KT [cn CN] [ct CT] mu MU, or type T model "
+          "NORMAL ..");
     law_ = nurbs_host::parse_coefficients(lmp, "Fix wall/nurbs", first, narg, arg);
     return;
   }

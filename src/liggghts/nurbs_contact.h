@@ -41,8 +41,8 @@ inline nurbs::ContactSettings contacts_only() {
   return settings;
 }
 
-// Contacts at the start of a run, or `when` particles were inserted, that are too deep for a penalty law, of all
-// ranks: one warning, not repeated while `last` is the same. Collective.
+// Contacts at the start of a run, or `when` particles were inserted, that are too deep for a penalty law, of
+// all ranks: one warning, not repeated while `last` is the same. Collective.
 void warn_deep(LAMMPS* lmp, const nurbs::DeepContacts& mine, const std::string& user, const std::string& when,
                const std::string& hint, std::string& last);
 

@@ -289,7 +289,7 @@ class ContactStages {
   void run_flat(ContactBlock& block, int lane, FlatContact& flat, const PolygonState& state);
   LeftPolygon leave_flat(ContactBlock& block, int lane, FlatContact& flat, const PolygonState& state,
                          double overlap);
-  void settle_left(ContactBlock& block, int lane, const Results& results, const LeftPolygon& left);
+  void settle_left(ContactBlock& block, int lane, Results& results, const LeftPolygon& left);
   void relax_factor(const ContactBlock& block, int lane, FlatContact& flat, const PolygonState& state);
   void relax_weight(ContactBlock& block, int lane, double gap);
   void book(double energy, int a, int b);

@@ -307,11 +307,18 @@ ContactStages::LeftPolygon ContactStages::leave_flat(ContactBlock& block, int la
 // Back to one contact, at the point that the search found: it gets the springs' mean, and the weight at which
 // it holds the polygon's energy. Its overlap is the least over all directions, not that along the face's
 // normal. What its springs hold less than the polygon's did is booked.
-void ContactStages::settle_left(ContactBlock& block, int lane, const Results& results,
-                                const LeftPolygon& left) {
+void ContactStages::settle_left(ContactBlock& block, int lane, Results& results, const LeftPolygon& left) {
   const int a = block.a[lane], b = block.b[lane];
-  const bool touching = results.touching[lane] != 0;
   const double kn = step_.model != nullptr ? 1 : step_.laws[block.law[lane]].kn;
+  if (a < -1) {  // its deepest point may lie beside the part of the plane that is wall
+    const double back = -results.gap[lane] - std::sqrt(2 * left.normal_energy / kn);
+    if (back > 0) {
+      partners_[-2 - a].shift += back;
+      results.gap[lane] += back;
+      results.touching[lane] = results.gap[lane] < 0;
+    }
+  }
+  const bool touching = results.touching[lane] != 0;
   const double full = 0.5 * kn * results.gap[lane] * results.gap[lane];
   double& weight = block.field[kWeight][lane];
   weight = touching && left.normal_energy > 0 ? std::min(left.normal_energy / full, kStiffest) : 1;
