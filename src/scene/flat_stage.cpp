@@ -310,18 +310,13 @@ ContactStages::LeftPolygon ContactStages::leave_flat(ContactBlock& block, int la
 void ContactStages::settle_left(ContactBlock& block, int lane, Results& results, const LeftPolygon& left) {
   const int a = block.a[lane], b = block.b[lane];
   const double kn = step_.model != nullptr ? 1 : step_.laws[block.law[lane]].kn;
-  if (a < -1) {  // its deepest point may lie beside the part of the plane that is wall
-    const double back = -results.gap[lane] - std::sqrt(2 * left.normal_energy / kn);
-    if (back > 0) {
-      partners_[-2 - a].shift += back;
-      results.gap[lane] += back;
-      results.touching[lane] = results.gap[lane] < 0;
-    }
-  }
   const bool touching = results.touching[lane] != 0;
   const double full = 0.5 * kn * results.gap[lane] * results.gap[lane];
   double& weight = block.field[kWeight][lane];
-  weight = touching && left.normal_energy > 0 ? std::min(left.normal_energy / full, kStiffest) : 1;
+  weight = !touching                ? 1
+           : left.normal_energy > 0 ? std::min(left.normal_energy / full, kStiffest)
+           : a < -1                 ? kSoftest
+                                    : 1;
   if (step_.model != nullptr) return;
   double energy = left.normal_energy + left.tangential_energy;
   ContactState single{};

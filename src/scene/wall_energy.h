@@ -13,6 +13,8 @@ namespace nurbs {
 constexpr double kRelaxation = 2e-3;
 constexpr double kResting = 1e-4;  // of its overlap that a contact at rest moves along the normal in a step
 constexpr double kStiffest = 8;    // factor or weight of a contact; four is what a corner needs
+constexpr double kSoftest = 1e-3;  // weight of one whose polygon held nothing over its part of a mesh's
+                                   // plane, beside which the body's deepest point may lie
 
 // A contact of a body in the balance.
 struct ContactStages::Holding {
