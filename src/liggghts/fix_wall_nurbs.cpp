@@ -113,6 +113,11 @@ int FixWallNurbs::parse_mesh(int narg, char** arg) {
     if (dynamic_cast<FixMeshSurface*>(fix) == nullptr)
       fail_all(FLERR, lmp,
                "Fix wall/nurbs mesh: fix " + name + " is a " + fix->style + "; it must be a mesh/surface");
+    if (std::strcmp(fix->style, "mesh/surface/stress/servo") == 0)
+      fail_all(FLERR, lmp,
+               "Fix wall/nurbs mesh: fix " + name +
+                   " is a mesh/surface/stress/servo, which wants the contacts of fix wall/gran; use "
+                   "mesh/surface/stress and fix move/mesh");
     for (const Mesh& mesh : meshes_)
       if (mesh.id == name) fail_all(FLERR, lmp, "Fix wall/nurbs mesh: fix " + name + " is there twice");
     meshes_.push_back({name, nullptr, nullptr, {}, {}});

@@ -317,6 +317,16 @@ class MovingWalls(unittest.TestCase):
         self.assertGreater(frames(shaken)[:, 0, 5].max(), 0.3)
         self.assertGreater(frames(shaken)[:, 0, 2].min(), 0.02)
 
+    def test_meshes_that_riggle_or_follow_a_variable(self):
+        variable = ("variable vx equal 0.3*cos(20*step*1e-5)\nvariable zero equal 0\n" + MESH +
+                    "\nfix mv all move/mesh mesh m linear/variable v_vx v_zero v_zero")
+        for before in (MESH + "\nfix mv all move/mesh mesh m riggle origin 0 0 0 axis 0 1 0 period 0.5 amplitude 5", variable):
+            options = dict(mesh=sheet(3, 0.15), law="kn 1e5 kt 5e4 cn 100 ct 20 mu 0.5", before=before)
+            one = last(run("mesh m", self.BALL, (), steps="run 3000", **options))
+            self.assertEqual(last(run("mesh m", self.BALL, (), steps="run 1700\nrun 1300", **options)), one)
+            self.assertEqual(last(run("mesh m", self.BALL, (), steps="run 3000", ranks=4, **options)), one)
+            self.assertGreater(abs(np.array(one[3:])).max(), 0.01)  # it was moved
+
     def test_restart_in_motion(self):
         motion = LAW + " move rotate origin 0 0 0 axis 0 1 0 period 4"
         one = run("plane 0 0 0 0 0 1", self.BALL, (), law=motion, steps="run 6000")
@@ -401,6 +411,9 @@ class BadInput(unittest.TestCase):
         self.assert_error("there is no fix nope", "mesh nope", **floor)
         self.assert_error("fix g is a gravity", "mesh g", **floor)
         self.assert_error("fix m is there twice", "mesh m m", **floor)
+        self.assert_error("use mesh/surface/stress and fix move/mesh", "mesh m", mesh=sheet(2, 0.1),
+                          before="fix m all mesh/surface/stress/servo file wall.stl type 1 com 0 0 0 ctrlPV force axis 0 0 -1 "
+                          "target_val 5 vel_max 0.2 kp 5")
         self.assert_error("meshes have fix move/mesh", "mesh m", law=LAW + " move linear 1 0 0", **floor)
         self.assert_error("must be plane, cylinder or mesh", "ball 1 2 3")
         self.assert_error("axis q must be x, y or z", "cylinder q 1 0 0")
