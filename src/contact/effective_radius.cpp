@@ -3,14 +3,21 @@
 
 #include <cmath>
 
+#include "contact/sphere_search.h"
+
 namespace nurbs {
 
 // II in the orthonormal frame (t, s): J^-T II J^-1, with J = (lu, t.sv; 0, s.sv) from parameters to the
 // frame.
 SurfaceCurvature curvature_at(const Particle& particle, const PointMemory& point, const Vec3& outward) {
+  if (!(point.patch >= 0)) {  // solved as a sphere, or not at all
+    const Roundness round = roundness(*particle.shape);
+    if (!(round.slope * round.slope < kCreaseAngle2)) return {};
+    return {(Mat3::Identity() - outward * outward.transpose()) / (particle.scale * round.radius), true};
+  }
   using Slot = JetLanes::Slot;
   const int patch = static_cast<int>(point.patch);
-  if (!(point.patch >= 0) || patch >= static_cast<int>(particle.shape->patches.size())) return {};
+  if (patch >= static_cast<int>(particle.shape->patches.size())) return {};
   JetLanes jet;
   evaluate2(particle.shape->patches[patch], point.u, point.v, &jet);
   const double shortest = std::fmin(jet.at(Slot::kSu).norm(), jet.at(Slot::kSv).norm());

@@ -9,6 +9,7 @@
 #include "contact/pair_memory.h"
 #include "contact/polytope.h"
 #include "contact/support_turn.h"
+#include "contact/sphere_search.h"
 #include "reference/cso.h"
 
 namespace nurbs {
@@ -60,6 +61,7 @@ class Ladder {
 
   // The rungs that evaluate surfaces.
   __attribute__((noinline)) void solve(ContactResult* r) {
+    if (solve_spheres(a_, b_, settings_, memory_, r)) return;
     const bool touched = memory_.proof.contact != 0;
     const PairFrame pair(a_, b_);
     if (!touched && bounds(pair, r)) return;

@@ -6,6 +6,7 @@
 #include "contact/certificate.h"
 #include "contact/pair_memory.h"
 #include "contact/pair_search.h"
+#include "contact/sphere_search.h"
 #include "nurbs/tolerances.h"
 
 namespace nurbs {
@@ -83,6 +84,7 @@ class PlaneLadder {
   // The rungs that evaluate surfaces.
   void solve(ContactResult* r) {
     if (!finite(particle_)) return;
+    if (solve_sphere_on_plane(particle_, height_, normal_, settings_, memory_, r)) return;
     const bool touched = memory_.proof.contact != 0;
     axes_ = particle_.q.toRotationMatrix();
     d_ = axes_.transpose() * -normal_;

@@ -49,7 +49,8 @@ void Bodies::update(int i, double dt, bool renumbered) {
     known.stamp = nurbs::stamp(p);
     path_[i] = 0;
   } else {
-    path_[i] += (p.x - Vec3::Map(r.x)).norm() + r.radius * std::sqrt(turned2(p.q, known.q));
+    path_[i] += (p.x - Vec3::Map(r.x)).norm();
+    if (!shape.proofs.sphere) path_[i] += r.radius * std::sqrt(turned2(p.q, known.q));
   }
   store(p.q, known.q);
   store(p.x, r.x);

@@ -128,6 +128,13 @@ double ContactStages::path(int k) const {
   return (a_[k] < 0 ? 0 : path[a_[k]]) + path[b_[k]];
 }
 
+// How far the paths may go on until a neighbour that is `lower` apart may touch. A sphere's turns are no
+// path, yet move its support by the round-off that it is known to.
+double ContactStages::expiry(int k, double lower) const {
+  const double size = record(b_[k]).radius + (a_[k] < 0 ? 0 : record(a_[k]).radius);
+  return path(k) + kBudgetShare * lower - 2 * kSphere * size;
+}
+
 std::uint64_t ContactStages::stamp_of(int a, int b) const {
   const Bodies& bodies = *step_.bodies;
   if (a < 0) return pair_stamp(stamp(step_.wall_normal), bodies.stamp(b), Solver::ladder);
@@ -229,7 +236,7 @@ void ContactStages::look(int k) {
   } else {
     const double lower = proven(k);
     if (lower > 0) {
-      expiry_[k] = path(k) + kBudgetShare * lower;
+      expiry_[k] = expiry(k, lower);
       return;
     }
   }
@@ -247,7 +254,7 @@ void ContactStages::look(int k) {
   proof.on_b = coarse(memory.on_b);
   proof.contact = 0;
   if (apart) {
-    if (has_proof(proof)) expiry_[k] = path(k) + kBudgetShare * r.lower;
+    if (has_proof(proof)) expiry_[k] = expiry(k, r.lower);
     return;
   }
   ContactRecord record{memory.model, memory.on_a, memory.on_b, {}, {0, 0, 0}, 1, 0};
@@ -509,7 +516,7 @@ void ContactStages::release(ContactBlock& block, int lane, double lower) {
   block.get(lane, kLocalModelSize, 10, on);
   proof.on_a = coarse(on[0]);
   proof.on_b = coarse(on[1]);
-  expiry_[k] = has_proof(proof) ? path(k) + kBudgetShare * lower : -kInfinity;
+  expiry_[k] = has_proof(proof) ? expiry(k, lower) : -kInfinity;
   pool_.remove(proof.contact);
   proof.contact = 0;
 }

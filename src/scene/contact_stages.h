@@ -185,6 +185,7 @@ class ContactStages {
     return body >= 0 ? step_.bodies->record(body) : body == -1 ? *step_.wall : partners_[-2 - body].record;
   }
   double path(int k) const;
+  double expiry(int k, double lower) const;
   std::uint64_t stamp_of(int a, int b) const;
   int law_of(int a, int b) const;
   Vec3 offset(int a, int b) const;
