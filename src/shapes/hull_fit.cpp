@@ -13,6 +13,7 @@
 #include "nurbs/bernstein.h"
 #include "shapes/convex_fit.h"
 #include "shapes/primitives.h"
+#include "shapes/rounded_polyhedron.h"
 
 namespace nurbs {
 namespace {
@@ -23,6 +24,11 @@ constexpr int kLadder[][2] = {{3, 1}, {4, 1}, {3, 2}, {4, 2}, {3, 3}, {4, 3},
 constexpr double kCurvatureShare = 3;  // least curvature over the tolerance, both relative
 constexpr double kLeastCurvature = 0.002, kMostCurvature = 0.1;
 constexpr double kSurelyTooCoarse = 3;  // times the tolerance: the next rung is skipped
+// A fit that aims at far less than it can reach weighs distances so heavily that it loses convexity: the aim
+// falls from kFirstAim (of the radius) with what has been reached.
+constexpr double kFirstAim = 0.06, kAimShare = 0.6;
+constexpr size_t kMostFaces = 60;  // of a polyhedron with rounded edges ...
+constexpr int kRoundings = 2;      // ... whose radius is found by the distance of the first one
 constexpr int kClosestSteps = 40;
 constexpr double kClosestStride = 0.3;  // parameters
 constexpr int kMostPieces = 200000;
@@ -194,12 +200,11 @@ class HullFitter {
     std::vector<Vec3> even;
     for (const Vec3& p : hull_.mesh().points) even.emplace_back(frame_.to * (p - frame_.center));
     const RayTarget target{ConvexHull(even)};
-    double reached = 1e300;
     for (const auto& [degree, spans] : kLadder) {
       if (options_.spans > 0 && spans != options_.spans) continue;
-      if (reached > kSurelyTooCoarse * options_.tolerance && reached < 1e300 && degree == 4) continue;
+      if (spans > 1 && options_.spans == 0 && try_polyhedron()) return best_;
+      if (degree == 4 && start_error_ < kFar && start_error_ > kSurelyTooCoarse * tolerance_) continue;
       if (try_rung(degree, spans, target)) return best_;
-      reached = std::min(reached, last_error_);
     }
     throw ShapeError("no body of up to 1736 control points is within the tolerance of " +
                      percent(options_.tolerance) + " of the hull; the best is within " + percent(least_) +
@@ -224,36 +229,68 @@ class HullFitter {
     return false;
   }
 
+  // The hull of a few faces with its edges rounded, as far as its corners allow: creases are dear to splines.
+  bool try_polyhedron() {
+    if (polyhedron_tried_) return false;
+    polyhedron_tried_ = true;
+    const std::vector<HalfSpace> faces = facets(hull_, kMostFaces);
+    if (faces.empty()) return false;
+    double rounding = tolerance_;
+    const std::string kind = "polyhedron of " + std::to_string(faces.size()) + " faces with rounded edges";
+    try {
+      for (int k = 0; k < kRoundings; ++k) {
+        const auto body = make_shape("fit", rounded_polyhedron(faces, mass_.center, rounding));
+        if (k + 1 == kRoundings && judge(body->surfaces, kind)) return true;
+        const HullDistance d = hull_distance(*body, hull_, 0.01 * tolerance_);
+        rounding *= 0.97 * tolerance_ / d.worst();  // a corner's distance grows with it
+      }
+    } catch (const ShapeError& error) {
+      say(kind + ": " + error.what());
+    }
+    return false;
+  }
+
   bool try_rung(int degree, int spans, const RayTarget& target) {
     const SmoothCube cube(degree, spans);
     const auto start = [&](int f, double u, double v) -> Vec3 {
       if (!start_.empty()) return evaluate(start_[f], u, v);
       return 0.9 * ray(f, u, v);
     };
-    ConvexFitOptions options;
-    options.tolerance = 0.97 * tolerance_;
-    options.least_curvature =
-        std::clamp(kCurvatureShare * options_.tolerance, kLeastCurvature, kMostCurvature);
-    options.most_curvature = 1 / options_.tolerance;
-    options.metric = frame_.to.transpose();
     const OffsetTarget offset = [&](const Vec3& x, const Vec3&, int& hint) { return target(x, hint); };
-    const ConvexFit fit = fit_convex(cube, fit_points(cube, start), offset, options);
-    if (fit.error < start_error_) {
-      start_error_ = fit.error;
-      start_ = cube.surfaces(fit.points);
+    ConvexFit fit;
+    fit.points = fit_points(cube, start);
+    double aim = std::max(tolerance_, std::min(kFirstAim * radius_, start_error_));
+    for (;;) {
+      fit = fit_convex(cube, fit.points, offset, aimed_at(aim));
+      if (fit.error < start_error_) {
+        start_error_ = fit.error;
+        start_ = cube.surfaces(fit.points);
+      }
+      if (fit.error > aim || aim <= tolerance_) break;
+      aim = std::max(tolerance_, kAimShare * fit.error);
     }
-    last_error_ = fit.error / radius_;
+    const double reached = fit.error / radius_;
     const std::string kind = std::string(degree == 3 ? "bicubic" : "biquartic") + ", " +
                              std::to_string(spans) + " x " + std::to_string(spans) + " spans, " +
                              std::to_string(cube.count()) + " control points";
     if (fit.error > 1.5 * tolerance_) {
-      say(kind + (fit.error < 1e300 ? ": off by about " + percent(last_error_) : ": not convex"));
-      if (fit.error < 1e300) least_ = std::min(least_, last_error_);
+      say(kind + (fit.error < kFar ? ": off by about " + percent(reached) : ": not convex"));
+      if (fit.error < kFar) least_ = std::min(least_, reached);
       return false;
     }
     std::vector<NurbsSurface> body = cube.surfaces(fit.points);
     transform(body, frame_.from, frame_.center);
     return judge(std::move(body), kind);
+  }
+
+  ConvexFitOptions aimed_at(double aim) const {
+    ConvexFitOptions options;
+    options.tolerance = 0.97 * aim;
+    options.least_curvature =
+        std::clamp(kCurvatureShare * options.tolerance, kLeastCurvature, kMostCurvature);
+    options.most_curvature = 1 / options.tolerance;
+    options.metric = frame_.to.transpose();
+    return options;
   }
 
   // Whether a body loads without a dent and is near enough; keeps it then.
@@ -277,7 +314,6 @@ class HullFitter {
     const double error = now.distance.worst() / radius_;
     say(kind + ": within " + percent(error));
     least_ = std::min(least_, error);
-    last_error_ = error;
     if (error > options_.tolerance) return false;
     best_ = std::move(now);
     return true;
@@ -291,8 +327,10 @@ class HullFitter {
   const HullFitOptions& options_;
   MassProperties mass_;
   Frame frame_;
-  double radius_ = 0, tolerance_ = 0, last_error_ = 1e300, least_ = 1e300, start_error_ = 1e299;
+  static constexpr double kFar = 1e299;
+  double radius_ = 0, tolerance_ = 0, least_ = kFar, start_error_ = kFar;
   std::vector<NurbsSurface> start_;
+  bool polyhedron_tried_ = false;
   HullFit best_;
 };
 

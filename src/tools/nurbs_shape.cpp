@@ -18,11 +18,13 @@
 #include "body/proofs.h"
 #include "body/shape.h"
 #include "body/support.h"
+#include "io/mesh_file.h"
 #include "io/shape_file.h"
 #include "nurbs/affine.h"
 #include "shapes/primitives.h"
 #include "shapes/random_pebble.h"
 #include "shapes/revolved.h"
+#include "shapes/rounded_polyhedron.h"
 #include "tools/command.h"
 
 namespace {
@@ -115,6 +117,12 @@ class Options {
   double positive(const std::string& name) const { return numbers(name, 1, kLeast, kMost)[0]; }
   double positive(const std::string& name, double otherwise) const {
     return has(name) ? positive(name) : otherwise;
+  }
+
+  // The value as given.
+  std::string text(const std::string& name) const {
+    if (!has(name)) fail(name + " is missing");
+    return command_->get_option(name)->results()[0];
   }
 
   Vec3 axes() const {
@@ -314,6 +322,37 @@ Body make_rounded_box(const Options& options) {
   return outward(rounded_box(axes, rounding));
 }
 
+constexpr int kMostFacets = 300;
+
+Body make_rounded_polyhedron(const Options& options) {
+  if (options.has("--solid") == options.has("--mesh"))
+    options.fail("one of --solid and --mesh says which polyhedron");
+  const double rounding = options.positive("--rounding");
+  if (options.has("--solid")) {
+    const double radius = options.positive("--radius", 1);
+    const std::vector<HalfSpace> faces = platonic_solid(options.text("--solid"), radius);
+    if (faces.empty())
+      options.fail("--solid is " + options.text("--solid") +
+                   ", must be tetrahedron, cube, octahedron, dodecahedron or icosahedron");
+    if (rounding >= faces[0].offset)
+      options.fail("--rounding is " + format("%g", rounding) + ", must be below the inner radius, " +
+                   format("%.6g", faces[0].offset));
+    return outward(rounded_polyhedron(faces, Vec3::Zero(), rounding));
+  }
+  if (options.has("--radius")) options.fail("--radius is for --solid: a mesh has its own size");
+  const std::string file = options.text("--mesh");
+  try {
+    const ConvexHull hull(read_mesh_file(file).points);
+    const std::vector<HalfSpace> faces = facets(hull, kMostFacets);
+    if (faces.empty())
+      throw ShapeError("its hull has more than " + std::to_string(kMostFacets) + " faces: use fit");
+    return outward(rounded_polyhedron(faces, hull.properties().center, rounding));
+  } catch (const ShapeError& error) {
+    const std::string what = error.what();
+    throw ShapeError(what.rfind(file, 0) == 0 ? what : file + ": " + what);
+  }
+}
+
 Body make_inertia(const Options& options) {
   const std::vector<double> j = options.numbers("--inertia", 6, -Options::kMost, Options::kMost);
   Mat3 inertia;
@@ -371,9 +410,10 @@ const std::vector<Maker>& makers() {
       {"tablet",
        "exact: cylinder with rounded rims, axis z; with --cap biconvex",
        {kOuter,
-        {"--height", "H", "of the whole; with --cap: of the band"},
+        {"--height", "H",
+         "of the whole tablet from face to face; with --cap of its cylindrical band alone, 0 for none"},
         kRim,
-        {"--cap", "C", "radius of the spherical caps"}},
+        {"--cap", "C", "makes both faces domes, of this radius of curvature, at least that of the tablet"}},
        make_tablet},
       {"lens",
        "exact: two spherical caps with a rounded rim, axis z",
@@ -387,6 +427,13 @@ const std::vector<Maker>& makers() {
        "exact: flat faces, edges of cylinders, corners of spheres",
        {{"--axes", "A,B,C", "half edges"}, {"--rounding", "R", "radius of edges and corners"}},
        make_rounded_box},
+      {"rounded-polyhedron",
+       "exact: flat faces, edges of cylinders, corners of spheres",
+       {{"--solid", "NAME", "tetrahedron, cube, octahedron, dodecahedron or icosahedron"},
+        {"--radius", "R", "of the sharp solid's corners, default 1"},
+        {"--mesh", "FILE", "instead of --solid: the convex hull of a mesh (STL, OBJ, PLY)"},
+        {"--rounding", "R", "radius of edges and corners; faces stay where they are"}},
+       make_rounded_polyhedron},
       {"superellipsoid",
        "|x/A|^E + |y/B|^E + |z/C|^E = 1, fitted",
        {kAxes,
