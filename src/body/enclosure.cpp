@@ -106,8 +106,12 @@ void hulls_of(const Net& f, const Vec4& noise, bool third, Hulls* h) {
 
 using Derivatives = std::array<AffineVector, kOrders>;
 
-// Of the quotient x / w by Leibniz' rule. False if w may vanish.
-bool divide(const Hulls& h, bool third, Derivatives* y) {
+// Of the quotient x / w by Leibniz' rule. False if w may vanish. `rational`: else w is 1.
+bool divide(const Hulls& h, bool rational, bool third, Derivatives* y) {
+  if (!rational) {
+    for (int k = 0; k < (third ? kOrders : kUUU); ++k) (*y)[k] = h[k].x;
+    return true;
+  }
   const auto w = [&](Order k) { return h[k].w; };
   if (!(w(k0).low() > 0)) return false;
   const AffineForm one = inverse(w(k0));
@@ -406,7 +410,7 @@ CellBounds enclose_in_frame(const BezierPatch& patch, const Cell& cell, bool wit
     for (int k = 0; k < kOrders; ++k) hulls[k].w = den[k].w;
   }
   Derivatives y;
-  if (!divide(hulls, third, &y)) return out;
+  if (!divide(hulls, patch.rational, third, &y)) return out;
 
   // The basis of the tangent plane, the normal N and the form D in that basis, frame's coordinates.
   AffineVector tangent_u = y[kU], tangent_v = y[kV], normal;

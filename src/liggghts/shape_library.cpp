@@ -3,11 +3,16 @@
 
 #include <mpi.h>
 
+#include <algorithm>
+#include <atomic>
 #include <cstdint>
 #include <cstdio>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
+#include <string_view>
+#include <thread>
+#include <unordered_map>
 
 #include "comm.h"
 #include "io/shape_file.h"
@@ -77,24 +82,62 @@ void ShapeLibrary::share_sources() {
     sources_.push_back(source);
 }
 
+// Files of equal content share one shape: whose each is.
+std::vector<std::size_t> ShapeLibrary::first_of_content() const {
+  std::unordered_map<std::string_view, std::size_t> known;
+  std::vector<std::size_t> first;
+  for (std::size_t k = 0; k < sources_.size(); ++k)
+    first.push_back(known.emplace(sources_[k].text, k).first->second);
+  return first;
+}
+
+// Every rank makes all shapes, on the cores that the ranks of its machine leave it: a thread takes the next
+// file until none is left. What comes out does not depend on who made it.
+std::vector<ShapeLibrary::Made> ShapeLibrary::make(const std::vector<std::size_t>& first) const {
+  std::vector<Made> made(sources_.size());
+  std::atomic<std::size_t> next{0};
+  const auto work = [&] {
+    for (std::size_t k; (k = next++) < sources_.size();) {
+      if (first[k] != k) continue;
+      try {
+        auto content = nurbs::parse_shape(sources_[k].text, sources_[k].file);
+        made[k].shape = nurbs::make_shape(sources_[k].name, std::move(content.surfaces), content.gyration,
+                                          &made[k].warnings);
+      } catch (const nurbs::ShapeError& error) {
+        made[k].failure = error.what();
+      }
+    }
+  };
+  MPI_Comm machine;
+  MPI_Comm_split_type(world, MPI_COMM_TYPE_SHARED, 0, MPI_INFO_NULL, &machine);
+  int ranks = 1;
+  MPI_Comm_size(machine, &ranks);
+  MPI_Comm_free(&machine);
+  const std::size_t cores = std::max<std::size_t>(std::thread::hardware_concurrency() / ranks, 1);
+  std::vector<std::thread> others;
+  for (std::size_t k = 1; k < std::min(cores, sources_.size()); ++k) others.emplace_back(work);
+  work();
+  for (std::thread& other : others) other.join();
+  return made;
+}
+
 void ShapeLibrary::build() {
   shapes_.clear();
   rotors_.clear();
-  for (const Source& source : sources_) {
+  const std::vector<std::size_t> first = first_of_content();
+  std::vector<Made> made = make(first);
+  for (std::size_t k = 0; k < sources_.size(); ++k) {
+    const Source& source = sources_[k];
     if (number_of(source.name) != 0)
       nurbs_host::warn(FLERR, lmp,
                        "Two shapes are named " + source.name + "; that name means the first of them");
-    std::vector<std::string> warnings;
-    try {
-      auto content = nurbs::parse_shape(source.text, source.file);
-      shapes_.push_back(
-          nurbs::make_shape(source.name, std::move(content.surfaces), content.gyration, &warnings));
-    } catch (const nurbs::ShapeError& error) {
-      const std::string what = error.what();
+    const std::string& what = made[k].failure;
+    if (!what.empty()) {
       const bool names_file = what.find(source.file) != std::string::npos;
       nurbs_host::fail_all(FLERR, lmp, names_file ? what : "Shape file " + source.file + ": " + what);
     }
-    for (const std::string& warning : warnings)
+    shapes_.push_back(first[k] == k ? made[k].shape : shapes_[first[k]]);
+    for (const std::string& warning : made[k].warnings)
       nurbs_host::warn(FLERR, lmp, "Shape file " + source.file + ": " + warning);
     rotors_.push_back(nurbs::make_rotor(shapes_.back()->principal_gyration, shapes_.back()->principal_axes));
   }
@@ -147,7 +190,7 @@ void ShapeLibrary::read_restart(FILE* file) {
 
 int ShapeLibrary::number_of(const std::string& name) const {
   for (int i = 0; i < count(); ++i)
-    if (shapes_[i]->name == name) return i + 1;
+    if (sources_[i].name == name) return i + 1;
   return 0;
 }
 
@@ -155,7 +198,7 @@ int ShapeLibrary::require(const std::string& user, const std::string& name) cons
   const int number = number_of(name);
   if (number != 0) return number;
   std::string names;
-  for (const auto& shape : shapes_) names += " " + shape->name;
+  for (const Source& source : sources_) names += " " + source.name;
   nurbs_host::fail_all(FLERR, lmp, user + ": shape " + name + " is not one of atom_style nurbs:" + names);
 }
 

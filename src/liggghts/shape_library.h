@@ -49,6 +49,13 @@ class ShapeLibrary : protected Pointers {
 
   std::string read_sources(const std::vector<std::string>& files);
   void share_sources();
+  struct Made {
+    std::shared_ptr<const nurbs::Shape> shape;
+    std::vector<std::string> warnings;
+    std::string failure;  // what is wrong with the file
+  };
+  std::vector<std::size_t> first_of_content() const;
+  std::vector<Made> make(const std::vector<std::size_t>& first) const;
   void build();
 
   std::vector<Source> sources_;
