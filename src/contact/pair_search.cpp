@@ -8,8 +8,8 @@
 #include "contact/pair_frame.h"
 #include "contact/pair_memory.h"
 #include "contact/polytope.h"
-#include "contact/support_turn.h"
 #include "contact/sphere_search.h"
+#include "contact/support_turn.h"
 #include "reference/cso.h"
 
 namespace nurbs {
