@@ -30,7 +30,7 @@ class Examples(unittest.TestCase):
         return result
 
     def test_at_most_forty_lines(self):
-        for name in ("packing", "hopper", "drum", "repose", "press"):
+        for name in ("packing", "shape_fidelity", "hopper", "drum", "repose", "press"):
             lines = (EXAMPLES / name / f"in.{name}").read_text().splitlines()
             self.assertLessEqual(sum(1 for line in lines if line.strip()), 40, name)
 
