@@ -10,6 +10,10 @@
 namespace nurbs {
 namespace {
 
+constexpr double kIntegralRoundoff = 1e-15;                         // of a patch's integral
+constexpr int kMostQuartered = 20000, kMostQuarteredPerPatch = 50;  // cells of a body; some 40 are usual at a
+                                                                    // singular corner, none elsewhere
+
 // Volume, first moments x y z, second moments xx yy zz xy xz yz.
 using Moments = Eigen::Array<double, 10, 1>;
 
@@ -67,7 +71,7 @@ Moments integrate_cell(const BezierPatch& patch, const Cell& cell, const GaussRu
 
 Moments integrate_adaptively(const BezierPatch& patch, const Cell& cell, const GaussRule& rule,
                              const Vec3& reference, const Moments& whole, const Moments& allowed,
-                             int halvings) {
+                             int halvings, int* left) {
   const double h = 0.5 * cell.size;
   const Cell quarters[4] = {{cell.u0, cell.v0, h},
                             {cell.u0, cell.v0 + h, h},
@@ -78,10 +82,11 @@ Moments integrate_adaptively(const BezierPatch& patch, const Cell& cell, const G
     parts[q] = integrate_cell(patch, quarters[q], rule, reference);
     sum += parts[q];
   }
-  if (halvings == 0 || ((sum - whole).abs() <= allowed).all()) return sum;
+  // Overflows make no number: halving would not end that, but ten times.
+  if (halvings == 0 || --*left < 0 || !((sum - whole).abs() > allowed).any()) return sum;
   sum.setZero();
   for (int q = 0; q < 4; ++q) {
-    sum += integrate_adaptively(patch, quarters[q], rule, reference, parts[q], allowed, halvings - 1);
+    sum += integrate_adaptively(patch, quarters[q], rule, reference, parts[q], allowed, halvings - 1, left);
   }
   return sum;
 }
@@ -136,17 +141,20 @@ MassProperties integrate_mass(const std::vector<BezierPatch>& patches) {
   }
   const Cell all{0, 0, 1};
   std::vector<Moments> whole;
-  Moments total = Moments::Zero();
+  Moments total = Moments::Zero(), largest = Moments::Zero();
   for (const BezierPatch& patch : patches) {
     whole.push_back(integrate_cell(patch, all, rules[rule_size(patch)], reference));
     total += whole.back();
+    largest = largest.max(whole.back().abs());
   }
   if (!(total[0] != 0)) return {};
-  const Moments allowed = kMomentTolerance * moment_scales(total);
+  // Patches that cancel leave a volume below which there is round-off only.
+  const Moments allowed = (kMomentTolerance * moment_scales(total)).max(kIntegralRoundoff * largest);
+  int left = kMostQuartered + kMostQuarteredPerPatch * static_cast<int>(patches.size());
   total.setZero();
   for (size_t p = 0; p < patches.size(); ++p) {
     total += patches[p].rational ? integrate_adaptively(patches[p], all, rules[rule_size(patches[p])],
-                                                        reference, whole[p], allowed, kMaxHalvings)
+                                                        reference, whole[p], allowed, kMaxHalvings, &left)
                                  : whole[p];
   }
   return from_moments(total, reference);

@@ -15,6 +15,9 @@
 namespace nurbs {
 namespace {
 
+// Diagonal of the box, in the file's units: second moments and squared forms stay within doubles.
+constexpr double kLeastSize = 1e-30, kMostSize = 1e30;
+
 // A shape under construction, with what its messages need.
 struct Draft {
   Shape shape;
@@ -39,12 +42,15 @@ void check_surfaces(const std::vector<NurbsSurface>& surfaces) {
   }
 }
 
-double diagonal(const std::vector<BezierPatch>& patches) {
+Vec3 sides_of_box(const std::vector<BezierPatch>& patches) {
   Eigen::AlignedBox3d box;
   for (const BezierPatch& patch : patches) {
     for (const Vec4& p : patch.points) box.extend(Vec3(p.head<3>() / p[3]));
   }
-  return box.diagonal().norm();
+  return box.diagonal();
+}
+double diagonal(const std::vector<BezierPatch>& patches) {
+  return sides_of_box(patches).norm();
 }
 
 void split(Draft& draft) {
@@ -80,6 +86,10 @@ void connect(Draft& draft) {
   Shape& s = draft.shape;
   const double size = diagonal(s.patches);
   if (!(size > 0)) throw ShapeError("all control points coincide");
+  if (!(size >= kLeastSize && size <= kMostSize)) {
+    throw ShapeError("the control points' box has a diagonal of " + number(size) + ", must be " +
+                     number(kLeastSize) + ".." + number(kMostSize));
+  }
   const UnmatchedEdge left = connect_patches(s.patches, kJoinTolerance * size, s.links);
   if (left.patch < 0) return;
   std::string message = edge_name(draft, left.patch, left.edge) + " has no partner: the surface is open";
@@ -139,13 +149,16 @@ void orient_and_weigh(Draft& draft) {
   Shape& s = draft.shape;
   draft.turned.assign(s.surfaces.size(), false);
   turn_surfaces(draft, sides_to_turn(draft));
+  const Vec3 sides = sides_of_box(s.patches);
+  const double size = sides.norm();
+  if (!(sides.minCoeff() > kLeastVolume * size))
+    throw ShapeError("the patches enclose no volume: they are flat");
   s.mass = integrate_mass(s.patches);
   if (s.mass.volume < 0) {
     turn_surfaces(draft, std::vector<bool>(s.surfaces.size(), true));
     s.mass.volume = -s.mass.volume;
     s.mass.inertia = -s.mass.inertia;
   }
-  const double size = diagonal(s.patches);
   if (!(s.mass.volume > kLeastVolume * size * size * size)) {
     throw ShapeError("the patches enclose no volume: " + number(s.mass.volume));
   }

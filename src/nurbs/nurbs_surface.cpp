@@ -10,6 +10,8 @@
 namespace nurbs {
 namespace {
 
+constexpr double kMostWeights = 1e9;  // largest weight of a surface over its least
+
 using Column = std::array<Vec4, kMaxDegree + 1>;  // the control points that act on one span
 
 // The index k of the non-empty span with knots[k] <= t < knots[k + 1]; the last one at the end of the domain.
@@ -149,8 +151,11 @@ std::string find_defect(const NurbsSurface& s) {
     out << s.points.size() << " control points, must be size_u * size_v = " << expected;
     return out.str();
   }
+  double lightest = std::numeric_limits<double>::infinity(), heaviest = 0;
   for (size_t i = 0; i < s.points.size(); ++i) {
     const double w = s.points[i][3];
+    lightest = std::min(lightest, w);
+    heaviest = std::max(heaviest, w);
     if (!(w > 0) || !std::isfinite(w)) {
       out << "weight[" << i << "] = " << w << ", must be > 0 and finite";
       return out.str();
@@ -161,6 +166,12 @@ std::string find_defect(const NurbsSurface& s) {
           << "xyz"[c] << " = " << s.points[i][c] / w << ", must be finite";
       return out.str();
     }
+  }
+  if (heaviest > kMostWeights * lightest) {
+    out.precision(6);
+    out << "weights from " << lightest << " to " << heaviest << ", must be within a factor of "
+        << kMostWeights;
+    return out.str();
   }
   return {};
 }

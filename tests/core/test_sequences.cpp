@@ -1,0 +1,49 @@
+// Warm sequences in small: every body on a plane and with one other, memory kept from step to step. The long
+// ones are bench/sequences.
+#include <gtest/gtest.h>
+
+#include "support/sequences.h"
+
+namespace nurbs::sequences {
+namespace {
+
+long steps_of(const Actor& a, long usual) {
+  return a.every > 1 ? usual / 10 : usual;
+}
+
+void expect_right(const Report& r, const std::string& what) {
+  EXPECT_EQ(r.failed(), 0) << what << ": " << r.unresolved << " unresolved, " << r.wrong << " wrong, "
+                           << r.bracket << " brackets; " << r.first;
+}
+
+TEST(Sequences, on_planes) {
+  std::uint64_t seed = 1;
+  for (const Actor& a : all_actors()) {
+    const Report r = run_plane(a, seed++, steps_of(a, 600));
+    expect_right(r, a.name);
+    EXPECT_GT(r.touching, r.steps / 4) << a.name;
+  }
+}
+
+TEST(Sequences, pairs) {
+  const int count = static_cast<int>(all_actors().size());
+  for (int k = 0; k < count; ++k) {
+    const Actor &a = all_actors()[k], &b = all_actors()[(7 * k + 3) % count];
+    const long steps = std::min(steps_of(a, 400), steps_of(b, 400));
+    const Report r = run_pair(a, b, 100 + k, steps);
+    expect_right(r, a.name + ", " + b.name);
+    EXPECT_GT(r.touching, steps / 10) << a.name << ", " << b.name;
+  }
+}
+
+// The judge itself: a body a hair larger than its truth must be seen.
+TEST(Sequences, a_wrong_body_is_seen) {
+  Actor wrong = all_actors()[0];
+  const auto right = wrong.solid.support;
+  wrong.solid.support = [right](const Vec3& d) -> Vec3 { return (1 + 1e-7) * right(d); };
+  EXPECT_GT(run_plane(wrong, 1, 300).failed(), 0);
+  EXPECT_GT(run_pair(wrong, all_actors()[21], 1, 300).failed(), 0);
+}
+
+}  // namespace
+}  // namespace nurbs::sequences
