@@ -10,7 +10,7 @@
 namespace nurbs {
 namespace {
 
-constexpr double kMostWeights = 1e9;  // largest weight of a surface over its least
+constexpr double kMostWeights = 1e15;  // largest weight of a surface over its least
 
 using Column = std::array<Vec4, kMaxDegree + 1>;  // the control points that act on one span
 

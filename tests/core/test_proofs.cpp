@@ -10,6 +10,7 @@
 #include "body/enclosure.h"
 #include "body/joints.h"
 #include "body/local_form.h"
+#include "body/proofs.h"
 #include "body/shape.h"
 #include "body/support.h"
 #include "contact/pair_search.h"
@@ -195,6 +196,173 @@ TEST(Radii, of_nearly_flat_faces_are_proven) {
     if ((d - f.normal).norm() > kNormalMargin) continue;
     EXPECT_LE(find_support(*s, d).h, d.dot(f.point) + 0.5 * r * (d - f.normal).squaredNorm() + 1e-14);
   }
+}
+
+// --- spikes between samples
+// ----------------------------------------------------------------------------------------------------
+
+// A lens whose rim lies in a thousandth of its patch's parameter, near an end: 32 by 32 samples a patch,
+// which see all of it at even parameters, miss it.
+struct HiddenRim {
+  ShapePointer even, hidden;
+};
+HiddenRim hidden_rim() {
+  Surfaces body{surface_of_revolution({{0, -0.6, 1}, {1, -0.6, 1}, {1, 0, 1}, {1, 0.6, 1}, {0, 0.6, 1}})};
+  HiddenRim h{make_shape("even", body), nullptr};
+  for (int i = 0; i < body[0].size_u; ++i)
+    for (int j = 0; j < body[0].size_v; ++j) body[0].point(i, j) *= std::pow(1e3, j);
+  h.hidden = make_shape("hidden", body);
+  return h;
+}
+
+template <class Visit>
+void for_samples(const Shape& shape, int count, const Visit& visit) {
+  for (size_t p = 0; p < shape.patches.size(); ++p)
+    for (int i = 0; i < count; ++i)
+      for (int j = 0; j < count; ++j)
+        visit(SurfacePoint{static_cast<int>(p), (i + 0.5) / count, (j + 0.5) / count});
+}
+
+struct Seen {
+  double least = 1e300, most = 0, rate = 0, outer = 0, top = -1e300;
+};
+// `sector`: of the patches' u only; the body is one of revolution.
+Seen look(const Shape& shape, int count, const Vec3& d) {
+  Seen seen;
+  for_samples(shape, count, [&](const SurfacePoint& at) {
+    const BezierPatch& patch = shape.patches[at.patch];
+    const LocalForm f = local_form(patch, at.u, at.v);
+    if (f.u != at.u || f.v != at.v) return;
+    seen.least = std::min(seen.least, 1 / f.k_max);
+    if (f.k_min > 1e-6) seen.most = std::max(seen.most, 1 / f.k_min);
+    seen.outer = std::max(seen.outer, f.point.norm());
+    seen.top = std::max(seen.top, d.dot(f.point));
+    if (at.v > 1e-3 && at.v < 1 - 1e-3) seen.rate = std::max(seen.rate, rate_seen(patch, at.u, at.v));
+  });
+  return seen;
+}
+
+TEST(Spikes, are_in_every_enclosure_and_not_in_samples) {
+  const HiddenRim rim = hidden_rim();
+  const Vec3 d(1, 0, 0);
+  const Seen truth = look(*rim.even, 200, d), sampled = look(*rim.hidden, 32, d);
+  // What samples make of it.
+  EXPECT_GT(sampled.least, 1.5 * truth.least);
+  EXPECT_LT(sampled.outer, 0.95 * truth.outer);
+  EXPECT_LT(sampled.top, 0.95 * truth.top);
+  // What is proven of it.
+  const Shape& s = *rim.hidden;
+  EXPECT_LE(s.patch_curvature.min_radius, truth.least * (1 + 1e-6));
+  EXPECT_GE(s.patch_curvature.min_radius, 0.5 * truth.least);
+  EXPECT_GE(s.patch_curvature.max_radius, truth.most * (1 - 1e-6));
+  EXPECT_GE(s.bounding_radius, truth.outer);
+  EXPECT_LE(s.bounding_radius, truth.outer * (1 + 1e-2));
+  EXPECT_LE(s.inner_radius, 0.31);  // half its height
+  const Support top = find_hull_support(s, d);
+  EXPECT_GE(top.upper, truth.top);
+  EXPECT_NEAR(top.h, rim.even->bounding_radius, 1e-2);
+  // The rates and normals of the rim at the parameters it has: u = r s / (1 + (r - 1) s) of the even ones.
+  Random random(12);
+  int finite = 0;
+  for (int k = 0; k < 2000; ++k) {
+    const double t = random.uniform(0.02, 0.98);
+    const SurfacePoint at{random.below(static_cast<int>(s.patches.size())), random.uniform(0.01, 0.99),
+                          t / (1e3 + (1 - 1e3) * t)};
+    const LocalRate local = rate_near(s.rates[at.patch], at);
+    if (!(local.rate < kFarAway)) continue;
+    ++finite;
+    EXPECT_LE(rate_seen(rim.even->patches[at.patch], at.u, t), local.rate * 1.001 + 1e-5);
+  }
+  EXPECT_TRUE(finite > 0 || s.proofs.rate == 0) << "no rate is promised near the rim, or it holds";
+  for (int trial = 0; trial < 200; ++trial) {
+    const int patch = random.below(static_cast<int>(s.patches.size()));
+    Cell cell = whole_patch(s.patches, patch);
+    for (int depth = random.whole(4, 24); depth > 0; --depth) {
+      auto [low, high] = halve(s.patches[patch], cell, depth % 3 == 0 && random.below(2));
+      cell = random.below(6) ? low : high;  // towards the rim
+    }
+    expect_encloses(s, patch, cell, random);
+  }
+}
+
+TEST(Spikes, of_a_joint_are_bounded) {
+  // Two flat patches along y whose second row rises by a hump of degree 9: the joint closes by up to 0.3 rad
+  // in the hump; seen through weights that are powers of 1/100 it lies between the 17 samples.
+  BezierPatch flat, humped;
+  flat.degree_u = humped.degree_u = 1;
+  flat.degree_v = humped.degree_v = 9;
+  const double hump[10] = {0, 0, 0, 0, 0.8, 0.8, 0, 0, 0, 0};
+  for (const double ratio : {1.0, 1e-2}) {
+    flat.points.clear();
+    humped.points.clear();
+    for (int i = 0; i < 2; ++i)
+      for (int j = 0; j < 10; ++j) {
+        const double w = std::pow(ratio, j);
+        flat.points.push_back(w * Vec4(i, j / 9.0, 0, 1));
+        humped.points.push_back(w * Vec4(i - 1, j / 9.0, i == 0 ? hump[j] : 0, 1));
+      }
+    flat.rational = humped.rational = true;
+    EdgeLink link;
+    link.patch = 1;
+    link.edge = 1;
+    double dense = 0, coarse = 0;
+    const auto angle = [&](double t) {
+      const Jet1 a = evaluate1(flat, 0, t), b = evaluate1(humped, 1, t);
+      return angle_between(a.su.cross(a.sv), b.su.cross(b.sv));
+    };
+    // Samples where the hump is, and 17 even ones.
+    for (int k = 0; k <= 20000; ++k) {
+      const double t = k / 20000.0;
+      dense = std::max(dense, angle(t / (t + (1 - t) * ratio)));
+    }
+    for (int k = 0; k < kKinkSamples; ++k) coarse = std::max(coarse, angle(k / (kKinkSamples - 1.0)));
+    const KinkBounds bounds = bound_kink(flat, 0, humped, link);
+    EXPECT_GE(std::max(bounds.opening, bounds.closing), dense * (1 - 1e-9)) << ratio;
+    EXPECT_LE(std::max(bounds.opening, bounds.closing), 1.2 * dense + 1e-9) << ratio;
+    if (ratio < 1) {
+      EXPECT_LT(coarse, 0.7 * dense) << "the samples see it: this shows nothing";
+    }
+  }
+}
+
+// --- dents
+// ----------------------------------------------------------------------------------------------------
+
+TEST(Dents, are_proven_absent_from_convex_bodies) {
+  for (const ShapePointer& shape : {sphere(), ellipsoid(), disc(), smooth_pebble(), polar(), cuboid()})
+    EXPECT_TRUE(proven_without_dents(*shape)) << shape->name;
+  EXPECT_TRUE(proven_without_dents(*make_shape("rounded", rounded_box({1, 0.8, 0.6}, 0.1))));
+  EXPECT_TRUE(proven_without_dents(*hidden_rim().hidden));
+}
+
+// A control point pushed in by any amount: where the proof holds, no dense sample bends inward and none lies
+// below another's tangent plane.
+TEST(Dents, no_proof_where_there_is_one) {
+  int proven = 0, dented = 0;
+  for (const double share : {1e-6, 1e-4, 1e-3, 3e-3, 1e-2, 0.1, 0.2, 0.3, 0.4, 0.6}) {
+    Surfaces body = pebble();
+    Vec4& p = body[2].point(1, 2);
+    p.head<3>() *= 1 - share;
+    ShapePointer shape;
+    try {
+      shape = make_shape("pushed", body);
+    } catch (const ShapeError&) {
+      ++dented;
+      continue;
+    }
+    double least = 1e300;
+    for_samples(*shape, 60, [&](const SurfacePoint& at) {
+      least = std::min(least, local_form(shape->patches[at.patch], at.u, at.v).k_min);
+    });
+    proven += proven_without_dents(*shape);
+    dented += least < 0;
+    if (least < 0) {
+      EXPECT_FALSE(proven_without_dents(*shape)) << share;
+    }
+  }
+  EXPECT_GT(proven, 1);
+  EXPECT_GT(dented, 0);
+  EXPECT_FALSE(proven_without_dents(*make_shape("blocky", fitted_superellipsoid({1, 0.9, 0.8}, 4, 3))));
 }
 
 TEST(Rates, hold_everywhere) {

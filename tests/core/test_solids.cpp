@@ -221,6 +221,63 @@ TEST(SavedCases, half_turn_between_two_plane_contacts) {
   }
 }
 
+// Row 9: a thin creased lens (100 : 1) is pushed flat past its mate, in contact all the way, memory kept. By
+// symmetry the normal stays in the plane of the axis and the way: the truth is a minimum over one angle.
+TEST(SavedCases, thin_lens_pushed_past_its_mate) {
+  Random random(9);
+  const double bend = 50.005;  // half thickness 0.01
+  const Solid lens = test::lens(random, bend);
+  const Vec3 axis = lens.normals[0], side = axis.unitOrthogonal();
+  const Particle a{lens.shape.get(), 1, Vec3::Zero(), Quat::Identity()};
+  Particle b = a;
+  double memory[kPairMemorySize] = {0};
+  int overlapping = 0;
+  for (int k = 0; k <= 400; ++k) {
+    b.x = (2.1 - 4.2 * k / 400) * side + (k % 3 ? 4e-3 : 1.2e-2) * axis;
+    const auto overlap = [&](double angle) {
+      const Vec3 d = std::cos(angle) * axis + std::sin(angle) * side;
+      return d.dot(lens.support(d)) - d.dot(lens.support(-d)) - d.dot(b.x);
+    };
+    double least = 1e300, at = 0;
+    for (int i = 0; i < 7200; ++i) {
+      const double p = overlap(i * M_PI / 3600);
+      if (p < least) least = p, at = i * M_PI / 3600;
+    }
+    for (double step = M_PI / 3600; step > 1e-12; step *= 0.7)
+      for (const double next : {at - step, at + step}) {
+        const double p = overlap(next);
+        if (p < least) least = p, at = next;
+      }
+    const ContactResult r = find_contact(a, b, ContactSettings(), memory);
+    ASSERT_NE(r.status, Status::unresolved) << k;
+    ASSERT_NEAR(r.gap, -least, 3e-9) << k;
+    overlapping += least > 0;
+  }
+  EXPECT_GT(overlapping, 200);
+}
+
+// Row 12: what the slow pairs cost, counted in Newton steps and hull queries (0.3 to 1 us each), not timed.
+TEST(SavedCases, cones_and_discs_take_few_steps) {
+  for (const Kind partner : {Kind::cone, Kind::lens, Kind::cylinder}) {
+    std::vector<int> steps;
+    Random random(12);
+    for (int k = 0; k < 300; ++k) {
+      const Solid &sa = solids_of(Kind::cone)[random.below(6)], &sb = solids_of(partner)[random.below(6)];
+      const Particle a{sa.shape.get(), 1, Vec3::Zero(), random.turn()};
+      Particle b{sb.shape.get(), 1, Vec3::Zero(), random.turn()};
+      const Vec3 d = random.direction();
+      const double size = std::min(sa.shape->bounding_radius, sb.shape->bounding_radius);
+      b.x = a.q * sa.support(a.q.conjugate() * d) - b.q * sb.support(b.q.conjugate() * -d) -
+            size * random.log_uniform(1e-5, 0.3) * d;
+      double memory[kPairMemorySize] = {0};
+      steps.push_back(find_contact(a, b, ContactSettings(), memory).iterations);
+    }
+    std::sort(steps.begin(), steps.end());
+    EXPECT_LE(steps[150], 150);
+    EXPECT_LE(steps.back(), 1000);
+  }
+}
+
 // A quaternion that drifted does not scale the body.
 TEST(SavedCases, drifted_quaternions_do_no_harm) {
   const Solid ball = test::ellipsoid_solid(Vec3(1, 0.8, 0.6));
