@@ -14,6 +14,7 @@
 #include "body/direction_atlas.h"
 #include "body/flat_faces.h"
 #include "body/normal_map.h"
+#include "body/revolution.h"
 #include "body/rolling.h"
 #include "nurbs/bezier_patch.h"
 #include "nurbs/nurbs_surface.h"
@@ -121,6 +122,7 @@ struct Shape {
   JointDistance joints;                    // to kinked joints: where the patch curvatures hold for the body
   NormalMap normal_map;                    // local bounds, for bodies with flats or dents
   DirectionAtlas atlas;
+  Revolution revolution;  // about an axis, if the body is one
   FlatFeatures flats;  // faces, creases and ruled lines; empty for round bodies
 
   // Whether a local maximum of d . x may be no global one.

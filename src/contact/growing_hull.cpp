@@ -172,17 +172,21 @@ bool GrowingHull::fan(int point) {
   return true;
 }
 
-GrowingHull::Growth GrowingHull::grow(int point, double eps) {
+GrowingHull::Growth GrowingHull::grow(int point, double eps, int below) {
   const Vec3& p = point_[point];
+  if (below >= 0) {
+    const double height = face_[below].normal.dot(p) - face_[below].offset;
+    if (height > eps && add(point, below, std::min(eps, 0.5 * height)) == Growth::grown) return Growth::grown;
+  }
   double height = eps;
   const int first = highest_seen_from(p, &height);
-  if (first < 0) return Growth::inside;
-  // A face that the point is level with, up to round-off, may count either way; one of them makes a disc.
-  const double level = std::min(eps, 0.5 * height);
-  for (const double threshold : {0.0, level, -level}) {
-    if (!find_visible(p, first, threshold)) continue;
-    return fan(point) ? Growth::grown : Growth::full;
-  }
+  return first < 0 ? Growth::inside : add(point, first, std::min(eps, 0.5 * height));
+}
+
+// A face that the point is level with, up to round-off, may count either way; one of them makes a disc.
+GrowingHull::Growth GrowingHull::add(int point, int first, double level) {
+  for (const double threshold : {0.0, level, -level})
+    if (find_visible(point_[point], first, threshold)) return fan(point) ? Growth::grown : Growth::full;
   return Growth::broken;
 }
 

@@ -42,8 +42,10 @@ class GrowingHull {
   int store(const Vec3& point);
   // Starts from four stored points; false when they span no volume. Starting again drops the old surface.
   bool start(int a, int b, int c, int d);
-  // Adds a stored point: the triangles that it sees make way for a fan over their horizon.
-  Growth grow(int point, double eps);
+  // Adds a stored point: the triangles that it sees make way for a fan over their horizon. `below`: a
+  // triangle that it ought to see, or -1. (Needles' normals are mostly round-off: far from them they seem to
+  // be seen.)
+  Growth grow(int point, double eps, int below = -1);
 
   int points() const { return points_; }
   const Vec3& point(int k) const { return point_[k]; }
@@ -76,6 +78,7 @@ class GrowingHull {
   bool find_visible(const Vec3& p, int first, double threshold);
   bool chain_horizon();
   bool fan(int point);
+  Growth add(int point, int first, double level);
 
   double sliver_;
   int points_ = 0, faces_ = 0;

@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "contact/growing_hull.h"
+#include "contact/ring_search.h"
 #include "contact/support_turn.h"
 
 namespace nurbs {
@@ -18,6 +19,7 @@ struct Witness {
   SurfacePoint on_a, on_b;
 };
 
+constexpr int kBeforeRings = 64;          // queries before rings of directions are looked for
 constexpr int kMostIdle = 30;             // queries in a row that leave the bracket as it is
 constexpr double kOneMinimum = 1 - 1e-6;  // cosine above which Newton has come to one minimum again
 constexpr double kFlatBend = 1e-3;        // of the overlap, of its bend along a crease
@@ -51,22 +53,25 @@ class Search {
     return false;
   }
 
-  void run(double enough) {
+  // Until `most` points are spent. May be gone on with.
+  void run(double enough, int most) {
     settle(best_);
     double last = kFarAway;
-    for (int idle = 0; hull_.points() < kHullVertices; ++idle) {
+    std::array<short, 3> asked = {-1, -1, -1};
+    for (int idle = 0; hull_.points() < most; ++idle) {
       const int near = best_face();
       if (near < 0 || upper_ - lower_ <= tolerance_ || lower_ > enough) return;
       if (upper_ - lower_ < last) idle = 0;
       last = upper_ - lower_;
-      if (idle > kMostIdle) {
+      const std::array<short, 3> corners = hull_.face(near).vertex;
+      if (idle > kMostIdle || corners == asked) {  // a face that outlives its own support never goes
         stalled_ = true;
         return;
       }
-      const std::array<short, 3> corners = hull_.face(near).vertex;
+      asked = corners;
       const int v = query(direction_to_ask_, closest_of(hull_.face(near), direction_to_ask_));
       if (v < 0 || upper_ - lower_ <= tolerance_) return;
-      if (hull_.grow(v, least_height()) != GrowingHull::Growth::grown) {
+      if (hull_.grow(v, least_height(), near) != GrowingHull::Growth::grown) {
         stalled_ = true;
         return;
       }
@@ -402,7 +407,12 @@ PolytopeResult solve_polytope(const PairFrame& pair, const Vec3& seed, double to
     const double joggle = attempt > 0 ? std::min(kJoggle * pair.reach, 0.05 * tolerance) : 0.0;
     Search search(pair, tolerance, joggle);
     const bool started = search.start(from);
-    if (started) search.run(enough);
+    if (started && attempt == 0 && (pair.a->revolution.found || pair.b->revolution.found)) {
+      search.run(enough, kBeforeRings);
+      best = search.result();
+      if (!best.converged && search_rings(pair, tolerance, &best)) return best;
+    }
+    if (started) search.run(enough, kHullVertices);
     const PolytopeResult result = search.result();
     const int spent = attempt > 0 ? best.iterations : 0;
     if (attempt == 0 || result.bracket.width() < best.bracket.width()) best = result;

@@ -106,6 +106,10 @@ constexpr int kNormalJointSamples = 64;    // along a kinked joint
 constexpr double kNormalCap = 0.2;         // widest cap of directions painted, rad
 constexpr double kJointCapSafety = 1.5;    // on the angle between the sides of a joint, which varies along it
 
+// --- bodies of revolution
+constexpr double kArcRoundoff = 1e-14;  // of the body's size: distance from the axis that is none
+constexpr double kArcError = 1e-12;     // of it: what arcs about the axis may be off by
+
 // --- support mapping
 constexpr int kSupportIterations = 60;  // 3 to 5 are usual; hops between patches count too
 constexpr double kSlopeTolerance =
@@ -167,7 +171,7 @@ constexpr double kLocalDrift = 20;         // of the tolerance that the contact 
 // --- polytope method
 constexpr int kHullVertices = 768;      // support pairs a fallback may spend; 20 to 80 are usual
 constexpr int kHullFaces = 3072;        // twice the vertices, and room for those being replaced
-constexpr int kHullAttempts = 3;        // from other directions, when round-off stalled the hull
+constexpr int kHullAttempts = 6;        // from other directions, when round-off stalled the hull
 constexpr double kHullTurn = 0.2;       // between them
 constexpr double kCoreShare = 0.5;      // of the smaller of the bodies' least curvature radii taken off, the
                                         // other wholly: more would leave two spheres no volume

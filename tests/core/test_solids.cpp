@@ -126,6 +126,77 @@ TEST(Solids, pairs_are_right_over_warm_sequences) {
     }
 }
 
+// --- bodies of revolution
+
+TEST(Revolution, is_found_and_proven) {
+  for (int kind = 0; kind < kKinds; ++kind)
+    for (const Solid& solid : solids_of(static_cast<Kind>(kind))) {
+      const Revolution& r = solid.shape->revolution;
+      EXPECT_EQ(r.found, static_cast<Kind>(kind) != Kind::polyhedron) << solid.shape->name;
+      if (!r.found) continue;
+      EXPECT_LT(r.error, 1e-12);
+      if (!solid.normals.empty()) {
+        EXPECT_NEAR(std::abs(r.axis.dot(solid.normals[0])), 1, 1e-13) << solid.shape->name;
+      }
+      Random random(kind);
+      for (int k = 0; k < 20; ++k) {  // turning does not change the support
+        const Vec3 d = random.direction(), turned = Quat(Eigen::AngleAxisd(random.uniform(0, 6), r.axis)) * d;
+        EXPECT_NEAR(find_hull_support(*solid.shape, d).h - d.dot(r.point),
+                    find_hull_support(*solid.shape, turned).h - turned.dot(r.point), 1e-13);
+      }
+    }
+  EXPECT_TRUE(test::ellipsoid_solid(Vec3(1, 0.5, 0.5)).shape->revolution.found);
+  EXPECT_TRUE(test::ellipsoid_solid(Vec3(1, 1, 0.1)).shape->revolution.found);
+  EXPECT_FALSE(test::ellipsoid_solid(Vec3(1, 0.8, 0.6)).shape->revolution.found);
+  EXPECT_FALSE(test::ellipsoid_solid(Vec3(1, 0.5 + 1e-9, 0.5)).shape->revolution.found);
+}
+
+// Bodies on (nearly) one axis, where whole rings of directions overlap by (nearly) the same.
+TEST(Revolution, tips_on_one_axis_are_resolved) {
+  Random random(60);
+  std::vector<Solid> solids;
+  for (int k = 0; k < 3; ++k) {
+    solids.push_back(test::cone(random, 0.3 + 0.3 * k, 1));
+    solids.push_back(test::double_cone(random, 1, 0.2 + 0.2 * k, 0.9));
+  }
+  solids.push_back(test::cylinder(random, 0.5, 0.3));
+  solids.push_back(test::lens(random, 1.5));
+  solids.push_back(test::ellipsoid_solid(Vec3(1, 0.6, 0.6)));
+  solids.back().normals = {Vec3::UnitX()};
+  for (int k = 0; k < 120; ++k) {
+    const Solid &sa = solids[random.below(9)], &sb = solids[random.below(9)];
+    const double off = k % 3 ? random.log_uniform(1e-16, 1e-2) : 0;  // rad, and length
+    Particle a{sa.shape.get(), 1, Vec3::Zero(), random.turn()},
+        b{sb.shape.get(), random.log_uniform(0.3, 1), Vec3::Zero(), random.turn()};
+    const Vec3 axis = a.q * sa.normals[0];
+    b.q = (random.turn_by(off) * Quat::FromTwoVectors(b.q * sb.normals[0], random.sign() * axis) * b.q)
+              .normalized();
+    const auto support_a = [&](const Vec3& d) -> Vec3 { return a.q * sa.support(a.q.conjugate() * d); };
+    const auto support_b = [&](const Vec3& d) -> Vec3 {
+      return b.scale * (b.q * sb.support(b.q.conjugate() * d));
+    };
+    const double size = std::min(sa.shape->bounding_radius, b.scale * sb.shape->bounding_radius);
+    const double depth = size * random.log_uniform(1e-6, 0.8);
+    b.x = support_a(axis) - support_b(-axis) - depth * axis + off * random.direction();
+    const auto overlap = [&](const Vec3& d) {
+      return d.dot(support_a(d)) - d.dot(support_b(-d)) - d.dot(b.x);
+    };
+    double memory[kPairMemorySize] = {0};
+    const ContactResult r = find_contact(a, b, ContactSettings(), memory);
+    const std::string name = sa.shape->name + ", " + sb.shape->name + ", pair " + std::to_string(k);
+    ASSERT_EQ(r.status, Status::converged) << name << ", width " << r.upper - r.lower;
+    if (r.gap > 0) continue;
+    ASSERT_NEAR(overlap(r.normal), -r.gap, 2e-9 * size) << name;
+    ASSERT_NEAR(r.normal.dot(r.point_b - r.point_a), r.gap, 1e-14) << name;
+    for (int i = 0; i < 200; ++i) {  // about the axis, and anywhere: none overlaps by less
+      Vec3 d =
+          i % 2 ? random.direction() : Vec3(Quat(Eigen::AngleAxisd(random.uniform(0, 6.3), axis)) * r.normal);
+      if (i % 4 == 0) d = (d + random.log_uniform(1e-9, 1e-2) * random.direction()).normalized();
+      ASSERT_GE(overlap(d), -r.upper - 1e-13) << name;
+    }
+  }
+}
+
 // --- saved cases
 // -------------------------------------------------------------------------------------------
 

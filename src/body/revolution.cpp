@@ -1,0 +1,186 @@
+// The axis from the arcs of a patch, the proof from what height and radius change along them.
+#include "body/revolution.h"
+
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "nurbs/bernstein.h"
+#include "nurbs/tolerances.h"
+
+namespace nurbs {
+namespace {
+
+using Row = Bernstein<double>;
+
+// Line number i of a patch's control points across the arcs.
+std::vector<Vec4> line_of(const BezierPatch& patch, bool arcs_in_u, int i) {
+  std::vector<Vec4> line;
+  const int n = arcs_in_u ? patch.degree_v : patch.degree_u;
+  for (int k = 0; k <= n; ++k) line.push_back(arcs_in_u ? patch.point(i, k) : patch.point(k, i));
+  return line;
+}
+
+Row times(const Row& a, const Row& b) {
+  return multiply(a, b, [](double x, double y) { return x * y; });
+}
+
+// Height, weight, and the two coordinates across the axis, homogeneous, along one such line. Points within
+// `noise` of the axis are moved onto it, and the surface by no more.
+struct Coordinates {
+  Row x, y, z, w;
+  Coordinates(const std::vector<Vec4>& line, const Vec3& t, const Vec3& s, const Revolution& about,
+              double noise) {
+    for (const Vec4& p : line) {
+      const Vec3 from = p.head<3>() - p[3] * about.point;
+      const double px = t.dot(from), py = s.dot(from);
+      const bool on_axis = std::hypot(px, py) <= noise * p[3];
+      x.push_back(on_axis ? 0 : px);
+      y.push_back(on_axis ? 0 : py);
+      z.push_back(about.axis.dot(from));
+      w.push_back(p[3]);
+    }
+  }
+};
+
+void add(double factor, const Row& a, Row* sum) {
+  if (sum->empty()) sum->resize(a.size(), 0.0);
+  for (size_t k = 0; k < a.size(); ++k) (*sum)[k] += factor * a[k];
+}
+
+// How far points of the patch leave the arcs they should be on, a length; infinite where that is not small.
+double off_arcs(const BezierPatch& patch, bool arcs_in_u, const Revolution& about, double size) {
+  const Vec3 t = about.axis.unitOrthogonal(), s = about.axis.cross(t);
+  const int n = arcs_in_u ? patch.degree_u : patch.degree_v;
+  std::vector<Coordinates> lines;
+  const double noise = kArcRoundoff * size;
+  for (int i = 0; i <= n; ++i) lines.emplace_back(line_of(patch, arcs_in_u, i), t, s, about, noise);
+  const Coordinates& first = lines[0];
+  double height = 0;  // relative to the weights' product, coefficient by coefficient
+  for (const Coordinates& line : lines) {
+    const Row a = times(line.z, first.w), b = times(first.z, line.w), w = times(line.w, first.w);
+    for (size_t k = 0; k < a.size(); ++k) height = std::max(height, std::abs(a[k] - b[k]) / w[k]);
+  }
+  const Row w2 = times(first.w, first.w);
+  Row r2 = times(first.x, first.x);
+  add(1, times(first.y, first.y), &r2);
+  double across = 0;  // relative to the squared radius
+  for (int m = 0; m <= 2 * n; ++m) {
+    Row squares, weights;
+    for (int i = std::max(0, m - n); i <= std::min(n, m); ++i) {
+      const double share = binomial(n, i) * binomial(n, m - i) / binomial(2 * n, m);
+      const Coordinates &a = lines[i], &b = lines[m - i];
+      add(share, times(a.x, b.x), &squares);
+      add(share, times(a.y, b.y), &squares);
+      add(share, times(a.w, b.w), &weights);
+    }
+    const Row left = times(squares, w2), right = times(r2, weights);
+    for (size_t k = 0; k < left.size(); ++k) {
+      const double off = std::abs(left[k] - right[k]);
+      if (!(off > 0)) continue;
+      if (!(right[k] > 0)) return std::numeric_limits<double>::infinity();
+      across = std::max(across, off / right[k]);
+    }
+  }
+  const double error = height + across * size + noise;
+  return std::isfinite(error) ? error : std::numeric_limits<double>::infinity();
+}
+
+double out_of_plane(const BezierPatch& patch, const Vec3& axis) {
+  double low = kFarAway, high = -kFarAway;
+  for (const Vec4& p : patch.points) {
+    const double z = axis.dot(p.head<3>()) / p[3];
+    low = std::min(low, z);
+    high = std::max(high, z);
+  }
+  return high - low;
+}
+
+// Of the widest bent line of control points: the normal of its plane, and the centre of the circle through
+// its ends and its middle.
+bool guess_axis(const std::vector<BezierPatch>& patches, bool arcs_in_u, Revolution* r) {
+  double largest = 0;
+  for (const BezierPatch& patch : patches) {
+    if ((arcs_in_u ? patch.degree_u : patch.degree_v) < 2) continue;
+    for (const double end : {0.0, 1.0}) {
+      const auto at = [&](double t) {
+        return arcs_in_u ? evaluate0(patch, t, end) : evaluate0(patch, end, t);
+      };
+      const Vec3 a = at(0), ab = at(0.5) - a, ac = at(1) - a, n = ab.cross(ac);
+      if (!(n.norm() > largest)) continue;
+      largest = n.norm();
+      r->axis = n / largest;
+      r->point =
+          a + (ac.squaredNorm() * n.cross(ab) + ab.squaredNorm() * ac.cross(n)) / (2 * n.squaredNorm());
+    }
+  }
+  return largest > 0;
+}
+
+// How far points of the patch are from x^2 / a^2 + y^2 / b^2 + z^2 / b^2 = 1 in the frame (a, t, s), a
+// length: the coefficients of what is left over those of w^2.
+double off_spheroid(const BezierPatch& patch, const Mat3& frame, double a, double b) {
+  const int m = patch.degree_u, n = patch.degree_v;
+  const auto product = [&](int i, int j, int k, int l, bool weights) {
+    const Vec4 &p = patch.point(i, j), &q = patch.point(k, l);
+    if (weights) return p[3] * q[3];
+    const Vec3 x = frame.transpose() * p.head<3>(), y = frame.transpose() * q.head<3>();
+    return x[0] * y[0] / (a * a) + (x[1] * y[1] + x[2] * y[2]) / (b * b) - p[3] * q[3];
+  };
+  double most = 0;
+  for (int u = 0; u <= 2 * m; ++u)
+    for (int v = 0; v <= 2 * n; ++v) {
+      double left = 0, weight = 0;
+      for (int i = std::max(0, u - m); i <= std::min(m, u); ++i)
+        for (int j = std::max(0, v - n); j <= std::min(n, v); ++j) {
+          const double share = binomial(m, i) * binomial(m, u - i) * binomial(n, j) * binomial(n, v - j);
+          left += share * product(i, j, u - i, v - j, false);
+          weight += share * product(i, j, u - i, v - j, true);
+        }
+      most = std::max(most, std::abs(left) / weight);
+    }
+  return most * std::max(a, b);
+}
+
+Revolution find_spheroid(const std::vector<BezierPatch>& patches, const Mat3& gyration, double size) {
+  const Eigen::SelfAdjointEigenSolver<Mat3> solver(gyration);
+  const Vec3& moment = solver.eigenvalues();
+  const int alone = moment[1] - moment[0] < moment[2] - moment[1] ? 2 : 0, other = 2 - alone;
+  const double mean = 0.5 * (moment[1] + moment[other]);
+  const double a = std::sqrt(2.5 * (2 * mean - moment[alone])), b = std::sqrt(2.5 * moment[alone]);
+  Revolution r;
+  r.axis = solver.eigenvectors().col(alone);
+  Mat3 frame;
+  frame << r.axis, r.axis.unitOrthogonal(), r.axis.cross(r.axis.unitOrthogonal());
+  for (const BezierPatch& patch : patches) {
+    r.error = std::max(r.error, off_spheroid(patch, frame, a, b));
+    if (!(r.error <= kArcError * size)) return {};
+  }
+  r.found = true;
+  r.error *= 2;
+  return r;
+}
+
+}  // namespace
+
+Revolution find_revolution(const std::vector<BezierPatch>& patches, const Mat3& gyration, double size) {
+  for (const bool arcs_in_u : {true, false}) {
+    Revolution r;
+    if (!guess_axis(patches, arcs_in_u, &r)) continue;
+    for (const BezierPatch& patch : patches) {
+      double error = out_of_plane(patch, r.axis);
+      if (error > kArcError * size)
+        error = std::min(off_arcs(patch, true, r, size), off_arcs(patch, false, r, size));
+      r.error = std::max(r.error, error);
+      if (!(r.error <= kArcError * size)) break;
+    }
+    if (!(r.error <= kArcError * size)) continue;
+    r.found = true;
+    r.error *= 2;  // there and back
+    return r;
+  }
+  return find_spheroid(patches, gyration, size);
+}
+
+}  // namespace nurbs

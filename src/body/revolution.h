@@ -1,0 +1,26 @@
+// Bodies of revolution: found, and proven to be such, at load.
+#pragma once
+
+#include <vector>
+
+#include "nurbs/bezier_patch.h"
+#include "nurbs/types.h"
+
+namespace nurbs {
+
+// An axis about which a body may be turned by any angle and stays where it is.
+struct Revolution {
+  bool found = false;
+  Vec3 axis = Vec3::UnitZ();  // unit
+  Vec3 point = Vec3::Zero();  // on it
+  double error = 0;           // no point of the body turns out of it by more than this, a length
+};
+
+// Of a closed body with inertia over mass `gyration` about its centre of mass, the origin. Every patch must
+// lie in a plane square to the axis, or have parameter lines of one kind that are circular arcs about it,
+// which is proven from Bernstein coefficients of height and squared radius: turning about the axis is then
+// tangential to the whole surface. Or the patches must lie on one spheroid. Patches that make such a body in
+// yet other parameters are not found. `size`: bounding radius.
+Revolution find_revolution(const std::vector<BezierPatch>& patches, const Mat3& gyration, double size);
+
+}  // namespace nurbs

@@ -1,0 +1,362 @@
+// Branch and bound over the azimuth, plane hulls over the angle from the axis; see ring_search.h.
+#include "contact/ring_search.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace nurbs {
+namespace {
+
+constexpr int kMostCircles = 96;         // supports evaluated
+constexpr int kMostSectors = 1200;       // bounded, some 0.3 us each
+constexpr int kDeepestSector = 60;       // halvings of the azimuth
+constexpr double kNearAxis = 0.2;        // sine between the axes up to which both bodies' circles are used
+constexpr double kNearlyAlike = 0.01;    // of the body's radius: what directions of a ring may differ by
+constexpr double kClosedShare = 0.9;     // of the tolerance at which a sector is closed ...
+constexpr double kMeridianShare = 0.4;   // ... and below which its width, not its circles, keeps it open
+constexpr double kLeastRingSine = 1e-3;  // of the angle from the axis: nearer it, directions are no ring
+constexpr double kLeastTilt = 3e-3;      // sine between the axes from which the mate's tip may do better
+constexpr int kFirstAngles = 7;
+
+// One body of revolution K and its mate M: axes and lengths of the pair frame, e = sign d.
+struct View {
+  const Shape *k, *m;
+  double scale_k, scale_m, sign;
+  Mat3 turn_k, turn_m;
+  Vec3 axis, mate_axis;    // unit; the second one not against the first
+  Vec3 offset;             // M's centre from K's
+  Vec3 point, mate_point;  // on the axes, from the bodies' centres
+  bool circles;            // of M are used
+  double tilt;             // sine between the axes
+
+  View(const PairFrame& pair, bool k_is_a) {
+    sign = k_is_a ? 1 : -1;
+    k = k_is_a ? pair.a : pair.b;
+    m = k_is_a ? pair.b : pair.a;
+    scale_k = k_is_a ? pair.scale_a : pair.scale_b;
+    scale_m = k_is_a ? pair.scale_b : pair.scale_a;
+    turn_k = k_is_a ? Mat3(Mat3::Identity()) : pair.turn;
+    turn_m = k_is_a ? pair.turn : Mat3(Mat3::Identity());
+    offset = sign * pair.offset;
+    axis = (turn_k * k->revolution.axis).normalized();
+    mate_axis = (turn_m * m->revolution.axis).normalized();
+    if (mate_axis.dot(axis) < 0) mate_axis = -mate_axis;
+    point = scale_k * (turn_k * k->revolution.point);
+    mate_point = scale_m * (turn_m * m->revolution.point);
+    tilt = axis.cross(mate_axis).norm();
+    circles = m->revolution.found && tilt < kNearAxis;
+    if (!circles) tilt = 0;
+  }
+  Vec3 across(const Vec3& x) const { return x - axis.dot(x) * axis; }
+};
+
+struct Angle {
+  double c, s;
+};
+
+// What one support evaluation says of every direction.
+struct Circle {
+  double r, z;  // of K
+  Vec3 middle;  // M's point, or the centre of its circle, from M's centre ...
+  Vec3 k;       // ... and from K's `point`
+  double rm;    // radius of that circle
+  Angle at;     // angle from the axis it was asked for
+  Vec3 x, xm;   // the supports themselves, from the bodies' centres
+};
+
+// (R, Z) of a circle at one azimuth.
+struct Meridian {
+  double r, z;
+};
+
+// The least over angles between two of the greatest of r s + z c.
+struct Least {
+  double value;
+  Angle at;
+  int from, to;     // circles level there, equal at an end of the range
+  Angle low, high;  // all that is below the threshold lies between
+};
+
+double cross(const Angle& x, const Angle& y) {
+  return x.c * y.s - x.s * y.c;
+}
+
+// Between two points of the polygon the support function is concave where positive: its minimum and all that
+// is below `threshold` is found from the angles where the greatest changes. Negative: minus infinity.
+// `noise`: round-off of the points.
+Least least_of_greatest(const Meridian* p, int count, Angle low, Angle high, double threshold, double noise) {
+  const auto height = [&](int i, const Angle& e) { return p[i].r * e.s + p[i].z * e.c; };
+  int top = 0;
+  for (int i = 1; i < count; ++i)
+    if (height(i, low) > height(top, low)) top = i;
+  Least least{height(top, low), low, top, top, low, high};
+  bool some = least.value < threshold, open = some;
+  Angle now = low;
+  for (int over = -1; over != top;) {
+    if (over >= 0) top = over;
+    Angle next = high;
+    double steepest = noise;
+    over = top;
+    for (int j = 0; j < count; ++j) {
+      const Angle level{p[j].r - p[top].r, p[top].z - p[j].z};  // where j comes above
+      const double turn = cross(now, level);
+      if (turn > noise) {
+        if (!(level.s > 0 && cross(level, next) > 0)) continue;
+        next = level;
+      } else {  // level now, as three points of a line are: the steepest goes on
+        if (!(turn > -noise && now.c * level.c + now.s * level.s > steepest)) continue;
+        next = now;
+        steepest = now.c * level.c + now.s * level.s;
+      }
+      over = j;
+    }
+    const double length = std::hypot(next.c, next.s);
+    next = {next.c / length, next.s / length};
+    const double h = height(top, next);
+    if (h < least.value) least = {h, next, top, over, least.low, least.high};
+    if (h < threshold) {
+      if (!some) least.low = now;
+      some = open = true;
+      least.high = high;
+    } else if (open) {
+      least.high = next;
+      open = false;
+    }
+    now = next;
+  }
+  if (!(least.value > 0)) least.value = -kFarAway;
+  return least;
+}
+
+class RingSearch {
+ public:
+  RingSearch(const PairFrame& pair, bool k_is_a, double tolerance)
+      : pair_(pair), view_(pair, k_is_a), tolerance_(tolerance) {
+    tangent_ = view_.axis.unitOrthogonal();
+    second_ = view_.axis.cross(tangent_);
+    noise_ = 4 * kRoundoff * pair.reach + view_.scale_k * view_.k->revolution.error +
+             (view_.circles ? view_.scale_m * view_.m->revolution.error : 0.0);
+  }
+
+  bool run(PolytopeResult* result) {
+    const Vec3 e = view_.sign * result->bracket.direction;
+    best_ = -result->bracket.lower;
+    best_e_ = e;
+    if (!(best_ > tolerance_) || !(view_.across(e).norm() > kLeastRingSine) || !query(e)) return false;
+    choose_mate(e);
+    on_k_ = last_k_;
+    on_m_ = last_m_;
+    if (!(differ() < kNearlyAlike * view_.scale_k * view_.k->bounding_radius)) return false;
+    const double phi = azimuth(e);
+    for (int k = 0; k < kFirstAngles; ++k) {
+      const double angle = M_PI * k / (kFirstAngles - 1);
+      query(direction({std::cos(angle), std::sin(angle)}, phi));
+    }
+    if (!close(phi)) return false;
+    fill(result);
+    return true;
+  }
+
+ private:
+  struct Sector {
+    double phi, half;
+    Angle low, high;
+  };
+
+  double azimuth(const Vec3& e) const { return std::atan2(second_.dot(e), tangent_.dot(e)); }
+  Vec3 outward(double phi) const { return std::cos(phi) * tangent_ + std::sin(phi) * second_; }
+  Vec3 direction(const Angle& a, double phi) const { return a.s * outward(phi) + a.c * view_.axis; }
+
+  // How much a turn about K's axis changes at the first direction.
+  double differ() const {
+    const double moved = view_.circles ? view_.tilt * view_.scale_m * view_.m->bounding_radius : 0;
+    return view_.across(circle_[0].k).norm() + 2 * moved;
+  }
+
+  // M's circles or, if they change more, its points: a tip stays where it is however M is tilted.
+  void choose_mate(const Vec3& e) {
+    if (!(view_.tilt > kLeastTilt)) return;
+    const double circles = differ();
+    const View before = view_;
+    view_.circles = false;
+    view_.tilt = 0;
+    count_ = 0;
+    query(e);
+    if (differ() <= circles) return;
+    view_ = before;
+    count_ = 0;
+    query(e);
+  }
+
+  bool query(const Vec3& e) {
+    if (count_ == kMostCircles) return false;
+    const double enough = kSupportShare * tolerance_;
+    const Support k = find_hull_support(*view_.k, view_.turn_k.transpose() * e, nullptr,
+                                        enough / view_.scale_k),
+                  m = find_hull_support(*view_.m, view_.turn_m.transpose() * -e, nullptr,
+                                        enough / view_.scale_m);
+    ++queries_;
+    Circle& c = circle_[count_++];
+    c.x = view_.scale_k * (view_.turn_k * k.point);
+    c.xm = view_.scale_m * (view_.turn_m * m.point);
+    c.z = view_.axis.dot(c.x - view_.point);
+    c.r = view_.across(c.x - view_.point).norm();
+    c.at = {view_.axis.dot(e), view_.across(e).norm()};
+    c.middle = c.xm;
+    c.rm = 0;
+    if (view_.circles) {
+      const Vec3 from = c.xm - view_.mate_point;
+      c.middle = view_.mate_point + view_.mate_axis.dot(from) * view_.mate_axis;
+      c.rm = (c.xm - c.middle).norm();
+    }
+    c.k = view_.offset - view_.point + c.middle;
+    const double p = view_.scale_k * k.upper + view_.scale_m * m.upper - e.dot(view_.offset);
+    last_ = p;
+    last_k_ = k.where;
+    last_m_ = m.where;
+    if (p < best_) {
+      best_ = p;
+      best_e_ = e;
+      on_k_ = last_k_;
+      on_m_ = last_m_;
+    }
+    return true;
+  }
+
+  // |d |e x b| / dphi| <= 2 tilt, e and b unit: what M's circles of radius r lose is 2 tilt half r at most,
+  // or that over the least sine of the range, times the sine.
+  bool by_circle(const Sector& sector) const { return std::min(sector.low.s, sector.high.s) > view_.tilt; }
+  double turned(double half, double r) const { return 2 * view_.tilt * half * r; }
+
+  // Of all circles for azimuths within `half` of the sector's.
+  void project(const Sector& sector, double half) {
+    const double phi = sector.phi;
+    const Vec3 u = outward(phi), left = outward(phi - half), right = outward(phi + half);
+    const double least_sine = std::min(sector.low.s, sector.high.s);
+    const double cb = view_.axis.dot(view_.mate_axis), bu = view_.circles ? view_.mate_axis.dot(u) : 0.0;
+    for (int i = 0; i < count_; ++i) {
+      const Circle& c = circle_[i];
+      const Vec3 k = view_.across(c.k);
+      double reach = std::max(k.dot(left), k.dot(right));  // the most of k.u over the interval
+      if (half >= M_PI) {
+        reach = k.norm();
+      } else if (half > 0) {
+        const double away = std::remainder(azimuth(k) - phi, 2 * M_PI);
+        if (std::abs(away) <= half) reach = k.norm();
+      }
+      meridian_[i] = {c.r - reach, c.z - view_.axis.dot(c.k)};
+      if (!(c.rm > 0)) continue;
+      const double eb = c.at.s * bu + c.at.c * cb, rho = std::sqrt(std::max(0.0, 1 - eb * eb));
+      if (!(rho > kNoDirection)) continue;  // the tangent plane 0
+      meridian_[i].r += c.rm * (c.at.s - eb * bu) / rho;
+      meridian_[i].z += c.rm * (c.at.c - eb * cb) / rho;
+      if (by_circle(sector)) meridian_[i].r -= turned(half, c.rm) / least_sine;
+    }
+  }
+
+  Least bound(const Sector& sector, double half, double threshold) {
+    project(sector, half);
+    const double turned =
+        by_circle(sector) ? 0 : this->turned(half, view_.scale_m * view_.m->bounding_radius);
+    Least least = least_of_greatest(meridian_, count_, sector.low, sector.high, threshold + turned + noise_,
+                                    4 * kRoundoff * pair_.reach);
+    least.value -= turned + noise_;
+    return least;
+  }
+
+  bool close(double phi) {
+    Sector stack[kDeepestSector + 2];
+    int top = 0, sectors = 0;
+    stack[top++] = {phi, M_PI, {1, 0}, {-1, 0}};
+    proven_ = kFarAway;
+    while (top > 0) {
+      if (++sectors > kMostSectors) return false;
+      Sector& sector = stack[top - 1];
+      const double threshold = best_ - kClosedShare * tolerance_;
+      const Least wide = bound(sector, sector.half, threshold);
+      if (wide.value >= threshold) {
+        proven_ = std::min(proven_, wide.value);
+        --top;
+        continue;
+      }
+      sector.low = wide.low;
+      sector.high = wide.high;
+      const Least here = bound(sector, 0, threshold);
+      if (here.value >= best_ - kMeridianShare * tolerance_) {
+        if (top > kDeepestSector) return false;
+        const double half = 0.5 * sector.half;
+        const Sector other{sector.phi + half, half, sector.low, sector.high};
+        sector.phi -= half;
+        sector.half = half;
+        stack[top++] = other;
+      } else if (!query(direction(here.at, sector.phi))) {
+        return false;
+      }
+    }
+    return best_ - proven_ <= tolerance_;
+  }
+
+  void fill(PolytopeResult* r) {
+    r->iterations += queries_;
+    const Vec3 d = view_.sign * best_e_;
+    r->bracket.direction = d;
+    r->bracket.lower = -best_;
+    r->bracket.upper = std::max(-proven_, -best_);
+    r->converged = true;
+    r->points.na = d;
+    r->points.nb = -d;
+    const double phi = azimuth(best_e_);
+    const Least least = bound({phi, 0, {1, 0}, {-1, 0}}, 0, -kFarAway);
+    // The circles level there, so weighted that the witnesses face each other.
+    const Meridian &p = meridian_[least.from], &q = meridian_[least.to];
+    const Angle across{-least.at.s, least.at.c};
+    const double tp = p.r * across.c + p.z * across.s, tq = q.r * across.c + q.z * across.s;
+    const double share = tp != tq ? std::clamp(tq / (tq - tp), 0.0, 1.0) : 1.0;
+    Vec3 xk, xm, yk, ym;
+    witness(circle_[least.from], phi, &xk, &xm);
+    witness(circle_[least.to], phi, &yk, &ym);
+    const Vec3 on_k = share * xk + (1 - share) * yk, on_m = share * xm + (1 - share) * ym;
+    const bool k_is_a = view_.sign > 0;
+    r->points.a = k_is_a ? on_k : on_m;
+    r->points.b = pair_.offset + (k_is_a ? on_m : on_k);
+    r->points.on_a = k_is_a ? on_k_ : on_m_;
+    r->points.on_b = k_is_a ? on_m_ : on_k_;
+    r->gap = r->bracket.lower;
+    const Vec3 shift = 0.5 * (r->gap - d.dot(r->points.b - r->points.a)) * d;
+    r->points.a -= shift;
+    r->points.b += shift;
+  }
+
+  void witness(const Circle& c, double phi, Vec3* on_k, Vec3* on_m) const {
+    *on_k = view_.point + c.r * outward(phi) + c.z * view_.axis;
+    *on_m = c.middle;
+    if (!view_.circles) return;
+    const Vec3 e = direction(c.at, phi), square = e - view_.mate_axis.dot(e) * view_.mate_axis;
+    if (square.norm() > kNoDirection) *on_m -= c.rm * square.normalized();
+  }
+
+  const PairFrame& pair_;
+  View view_;
+  const double tolerance_;
+  Vec3 tangent_, second_;  // square to the axis
+  double noise_;
+  double best_ = kFarAway, proven_ = kFarAway, last_ = 0;
+  Vec3 best_e_ = Vec3::UnitX();
+  SurfacePoint on_k_, on_m_, last_k_, last_m_;
+  int count_ = 0, queries_ = 0;
+  Circle circle_[kMostCircles];
+  Meridian meridian_[kMostCircles];
+};
+
+}  // namespace
+
+bool search_rings(const PairFrame& pair, double tolerance, PolytopeResult* result) {
+  for (const bool k_is_a : {true, false}) {
+    const Shape& k = k_is_a ? *pair.a : *pair.b;
+    const bool ring = k.revolution.found && !k.proofs.sphere;
+    if (ring && RingSearch(pair, k_is_a, tolerance).run(result)) return true;
+  }
+  return false;
+}
+
+}  // namespace nurbs

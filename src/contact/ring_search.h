@@ -1,0 +1,22 @@
+// Least overlap where a body of revolution makes rings of directions (nearly) alike: cones tip to tip, a tip
+// against a vertex on its axis, spheroids on one axis. A polytope of points would need thousands of them.
+#pragma once
+
+#include "contact/polytope.h"
+
+namespace nurbs {
+
+// Improves `result`, the polytope's answer for overlapping bodies of which A or B is one of revolution about
+// an axis: bracket and, where it closes, points and normal. True when the bracket is closed.
+//
+// With e = d (or -d, for B) at azimuth phi and angle alpha from the axis of K, the body of revolution,
+// p >= r_K |e - (e.a) a| + z_K e.a - e.(o + x) for every circle (r_K, z_K) of K about its axis a and point x
+// of the other body M; where M is of revolution too and its axis b near a, x is a circle of M's as well. At
+// one phi each such bound is R sin alpha + Z cos alpha (of M's circle, its tangent), so that the greatest of
+// them is the support function of points (R, Z) in the half plane and its minimum is the distance of their
+// hull: exact and cheap. Over an interval of phi R is lowered by what it may change, which is only as much as
+// the axes are apart; intervals are halved until that is little enough. No surface is evaluated for it but
+// where a new circle is needed.
+bool search_rings(const PairFrame& pair, double tolerance, PolytopeResult* result);
+
+}  // namespace nurbs
