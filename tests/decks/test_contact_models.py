@@ -465,7 +465,7 @@ class BadInput(unittest.TestCase):
         for words, parts in {
                 "model hertzz": ("model hertzz must be one of", "hertz/stiffness"),
                 "model": ("model", "must be one of"),
-                "tangential history model hertz": ("unknown keyword tangential", ),
+                "tangential history model hertz": ("model NORMAL must stand before tangential", ),
                 "model hertz tangential histroy": ("tangential histroy must be one of off history", ),
                 "model hertz cohesion sjkr tangential history": ("tangential is out of order", ),
                 "model hertz cohesion washino/capillary/viscous": ("washino/capillary/viscous can't be used", ),
