@@ -370,8 +370,10 @@ class BadInput(unittest.TestCase):
             self.refuse(sphere + command + "\n", "requires atom_style nurbs", files=SHAPES)
 
     def test_sphere_styles_refuse_the_particles(self):
-        for command in ("fix m all nve/sphere", "compute c all erotate/sphere"):
-            self.refuse(HEADER + "read_data in.data\n" + command + "\n", "atom style sphere", files=files())
+        for command, instead in (("fix m all nve/sphere", "fix nve/nurbs"),
+                                 ("compute c all erotate/sphere", "compute erotate/nurbs")):
+            self.refuse(HEADER + "read_data in.data\n" + command + "\n",
+                        "can't be used with atom_style nurbs; use " + instead, files=files())
 
     def test_arguments(self):
         for command, expected in (("fix m all nve/nurbs rotation euler", "euler must be symplectic, richardson or exact"),
