@@ -14,9 +14,9 @@ struct Shape;
 struct SurfaceBounds;
 
 // Cells of a cube map. With r = radius_at(n) finite, no dent, flat, closing or gaping joint has a normal
-// within kNormalMargin of n, and every curvature radius whose normal lies there is at most r. So the surface point x
-// with normal n is the only one, h(n) = n.x, and for |d - n| <= kNormalMargin, by h'' + h <= r along the
-// great circle,
+// within kNormalMargin of n, and every curvature radius whose normal lies there is at most r. So the surface
+// point x with normal n is the only one, h(n) = n.x, and for |d - n| <= kNormalMargin, by h'' + h <= r along
+// the great circle,
 //     h(d) <= d.x + r (1 - d.n).
 // (A direction at which the Gauss map of a closed surface of genus 0 is regular has one preimage more of
 // positive than of negative orientation; away from dents none is negative.)

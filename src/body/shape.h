@@ -123,7 +123,7 @@ struct Shape {
   NormalMap normal_map;                    // local bounds, for bodies with flats or dents
   DirectionAtlas atlas;
   Revolution revolution;  // about an axis, if the body is one
-  FlatFeatures flats;  // faces, creases and ruled lines; empty for round bodies
+  FlatFeatures flats;     // faces, creases and ruled lines; empty for round bodies
 
   // Whether a local maximum of d . x may be no global one.
   bool dented() const { return support_excess > kRoundoff * bounding_radius; }

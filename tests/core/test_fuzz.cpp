@@ -1,7 +1,7 @@
 // What nobody would hand over on purpose, under sanitizers too (make sanitized-tests FUZZ=1): every family of
 // pairs cold, warm and with memory that belongs to something else or is damaged; planes, meshes, edges,
 // vertices and cylinders; and shape files that are cut, spoilt or hostile. Answers must be numbers, and right
-// where the truth is known; files must be refused in one line or give a body that can be asked. NURBS_FUZZ=10
+// where the truth is known; files must be refused in one line or give a body that can be asked. NURBS_FUZZ=5
 // in the environment does ten times as much, NURBS_FUZZ_SEED=n something else.
 #include <gtest/gtest.h>
 
@@ -49,7 +49,7 @@ double setting(const char* name, double otherwise) {
   return text ? std::atof(text) : otherwise;
 }
 int rounds(double usual) {
-  return std::max(1, static_cast<int>(usual * setting("NURBS_FUZZ", 1)));
+  return std::max(1, static_cast<int>(usual * setting("NURBS_FUZZ", 0.5)));
 }
 std::uint64_t seed(std::uint64_t test) {
   return 1000 * static_cast<std::uint64_t>(setting("NURBS_FUZZ_SEED", 0)) + test;

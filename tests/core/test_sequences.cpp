@@ -19,7 +19,7 @@ void expect_right(const Report& r, const std::string& what) {
 TEST(Sequences, on_planes) {
   std::uint64_t seed = 1;
   for (const Actor& a : all_actors()) {
-    const Report r = run_plane(a, seed++, steps_of(a, 600));
+    const Report r = run_plane(a, seed++, steps_of(a, 300));
     expect_right(r, a.name);
     EXPECT_GT(r.touching, r.steps / 4) << a.name;
   }
@@ -29,7 +29,7 @@ TEST(Sequences, pairs) {
   const int count = static_cast<int>(all_actors().size());
   for (int k = 0; k < count; ++k) {
     const Actor &a = all_actors()[k], &b = all_actors()[(7 * k + 3) % count];
-    const long steps = std::min(steps_of(a, 400), steps_of(b, 400));
+    const long steps = std::min(steps_of(a, 200), steps_of(b, 200));
     const Report r = run_pair(a, b, 100 + k, steps);
     expect_right(r, a.name + ", " + b.name);
     EXPECT_GT(r.touching, steps / 10) << a.name << ", " << b.name;
