@@ -13,22 +13,6 @@ constexpr double kCoarsest = M_PI / 4;  // rad, between directions where maxima 
 constexpr double kFinest = 2e-3;        // and where there may be some,
 constexpr double kNearest = 0.02;       // or this far apart on the wall, in sizes of the body
 
-SurfaceContact surface_contact(const FeatureContact& f) {
-  SurfaceContact c;
-  c.gap = f.gap;
-  c.normal = f.normal;
-  c.on_body = f.on_body;
-  c.triangle = 0;
-  c.rung = Rung::warm;
-  c.memory = PairMemory{};
-  drop_proof(&c.memory.proof);
-  drop_model(&c.memory.model);
-  c.memory.on_a.patch = -1;
-  c.memory.on_b = {static_cast<double>(f.where.patch), f.where.u, f.where.v, {0, 0}};
-  c.memory.proof.stamp = 1;
-  return c;
-}
-
 // F and its slope along the circle, from one support search.
 struct Reach {
   double angle = 0, value = 0, slope = 0;
@@ -135,7 +119,7 @@ void add_inside(const Tube& tube, const Reach& top, double radius, SurfaceContac
   f.normal = -tube.direction(top.angle).normalized();
   f.on_body = top.on_body;
   f.where = top.where;
-  out->add(surface_contact(f));
+  out->add(surface_contact(f, 0));
 }
 
 // Returns what F is nowhere larger than, or infinity.
@@ -201,7 +185,7 @@ void find_outside(const Particle& particle, const Vec3& origin, const Vec3& axis
     f = find_line_contact(particle, origin, axis, -side, d, radius, &g.where);
   else
     f = find_line_contact(particle, origin, axis, d, d, radius, &g.where);
-  if (f.touching) out->add(surface_contact(f));
+  if (f.touching) out->add(surface_contact(f, 0));
 }
 
 }  // namespace

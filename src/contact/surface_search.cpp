@@ -482,22 +482,11 @@ class SurfaceSearch {
     const Shape& shape = *particle_.shape;
     if (weight < 0 && edged(shape) && -f.gap > kBluntest * particle_.scale * shape.curvature.min_radius)
       return;
-    SurfaceContact c;
+    SurfaceContact c = surface_contact(f, triangle);
     c.weight = weight;
     c.piece = piece;
     c.of[0] = first;
     c.of[1] = second;
-    c.gap = f.gap;
-    c.normal = f.normal;
-    c.on_body = f.on_body;
-    c.triangle = triangle;
-    c.rung = Rung::warm;
-    c.memory = PairMemory{};
-    drop_proof(&c.memory.proof);
-    drop_model(&c.memory.model);
-    c.memory.on_a.patch = -1;
-    c.memory.on_b = {static_cast<double>(f.where.patch), f.where.u, f.where.v, {0, 0}};
-    c.memory.proof.stamp = 1;
     out_.add(c);
   }
 
@@ -543,6 +532,22 @@ void SurfaceContacts::add(const SurfaceContact& c) {
     return;
   }
   contact[count++] = c;
+}
+
+SurfaceContact surface_contact(const FeatureContact& f, int triangle) {
+  SurfaceContact c;
+  c.gap = f.gap;
+  c.normal = f.normal;
+  c.on_body = f.on_body;
+  c.triangle = triangle;
+  c.rung = Rung::warm;
+  c.memory = PairMemory{};
+  drop_proof(&c.memory.proof);
+  drop_model(&c.memory.model);
+  c.memory.on_a.patch = -1;
+  c.memory.on_b = {static_cast<double>(f.where.patch), f.where.u, f.where.v, {0, 0}};
+  c.memory.proof.stamp = 1;
+  return c;
 }
 
 void find_surface_contacts(const Particle& particle, MeshPatch& patch, const ContactSettings& settings,

@@ -61,6 +61,9 @@ struct SurfaceContacts {
   void add(const SurfaceContact& c);
 };
 
+// The contact at an edge, a vertex or a line of the wall; nothing of it is proven beyond this pose.
+SurfaceContact surface_contact(const FeatureContact& f, int triangle);
+
 // Whether a body has flat faces, creases or corners, so that its contacts with pieces of a bent wall come and
 // go at finite overlap.
 inline bool edged(const Shape& shape) {
