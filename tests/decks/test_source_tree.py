@@ -20,12 +20,29 @@ COMMON = ["liggghts/nurbs_contact.h", "liggghts/atom_vec_nurbs.h", "atom.h", "co
 SKIPPED = {"register.cpp", "main.cpp"}  # for the packaged host only
 
 
+def source_lists(place):
+    """apt-get's options for lists of source packages of its own, in `place`, of the archives that the system knows."""
+    lists = pathlib.Path(place) / "apt"
+    for directory in ("parts", "lists/partial", "cache/archives/partial"):
+        (lists / directory).mkdir(parents=True)
+    known = pathlib.Path("/etc/apt")
+    for path in [known / "sources.list", *sorted((known / "sources.list.d").glob("*"))]:
+        if path.suffix in (".list", ".sources") and path.exists():
+            text = re.sub(r"^Types:.*$", "Types: deb-src", path.read_text(), flags=re.MULTILINE)
+            (lists / "parts" / path.name).write_text(re.sub(r"^deb ", "deb-src ", text, flags=re.MULTILINE))
+    options = {"Dir::Etc::sourcelist": "/dev/null", "Dir::Etc::sourceparts": lists / "parts",
+               "Dir::State::lists": lists / "lists", "Dir::Cache": lists / "cache", "APT::Sandbox::User": ""}
+    return [word for name, value in options.items() for word in ("-o", f"{name}={value}")]
+
+
 def fetch_source(place):
     """The host's src directory, unpacked from the source package."""
     if shutil.which("apt-get") is None:
         raise unittest.SkipTest("there is no apt-get to get LIGGGHTS's source with")
-    done = subprocess.run(["apt-get", "source", "--download-only", "--tar-only", "-qq", "liggghts"], cwd=place, text=True,
-                          stdout=subprocess.PIPE, stderr=subprocess.STDOUT, stdin=subprocess.DEVNULL, timeout=100)
+    apt = ["apt-get", *source_lists(place)]
+    for step in (["update"], ["source", "--download-only", "--tar-only", "liggghts"]):
+        done = subprocess.run([*apt, "-qq", *step], cwd=place, text=True, stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
+                              stdin=subprocess.DEVNULL, timeout=200)
     balls = sorted(pathlib.Path(place).glob("liggghts_*.orig.tar.*"))
     if done.returncode != 0 or not balls:
         raise unittest.SkipTest(f"apt-get source liggghts: {done.stdout.strip()[-200:]}")
