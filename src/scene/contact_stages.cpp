@@ -323,13 +323,32 @@ void ContactStages::begin_step(const Step& step) {
 }
 
 void ContactStages::end_step(double neighbours) {
-  for (ContactBlock& block : pool_.blocks())
-    if (block.used != 0) compute_block(block);
+  LineVector<ContactBlock>& blocks = pool_.blocks();
+  for (std::size_t k = 0; k < blocks.size(); ++k) {
+    if (k + 1 < blocks.size()) prefetch_bodies(blocks[k + 1]);
+    if (blocks[k].used != 0) compute_block(blocks[k]);
+  }
 
   double others = 0;
   for (int n = ContactCounts::bounds; n <= ContactCounts::fallback; ++n) others += counts_.value[n];
   counts_.value[ContactCounts::neighbours] = neighbours;
   counts_.value[ContactCounts::safe] = std::max(0.0, neighbours - others);
+}
+
+// The records and sums that a block will want lie about in memory: they are asked for a block ahead.
+void ContactStages::prefetch_bodies(const ContactBlock& block) const {
+  constexpr int kLine = 64;
+  const auto fetch = [](const void* from, std::size_t size) {
+    for (std::size_t at = 0; at < size; at += kLine) __builtin_prefetch(static_cast<const char*>(from) + at);
+  };
+  for (int lane = 0; lane < kBlock; ++lane) {
+    if (!(block.used >> lane & 1)) continue;
+    for (const int body : {block.a[lane], block.b[lane]}) {
+      if (body < 0) continue;
+      fetch(&step_.bodies->record(body), sizeof(BodyRecord));
+      if (body < step_.owned) fetch(&sums_[body], sizeof(Accumulator));
+    }
+  }
 }
 
 // Stage (c) for the contacts first to first + kWidth - 1.
