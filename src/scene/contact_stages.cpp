@@ -325,7 +325,7 @@ void ContactStages::begin_step(const Step& step) {
 void ContactStages::end_step(double neighbours) {
   LineVector<ContactBlock>& blocks = pool_.blocks();
   for (std::size_t k = 0; k < blocks.size(); ++k) {
-    if (k + 1 < blocks.size()) prefetch_bodies(blocks[k + 1]);
+    if (k + 1 < blocks.size()) prefetch(blocks[k + 1]);
     if (blocks[k].used != 0) compute_block(blocks[k]);
   }
 
@@ -335,12 +335,17 @@ void ContactStages::end_step(double neighbours) {
   counts_.value[ContactCounts::safe] = std::max(0.0, neighbours - others);
 }
 
-// The records and sums that a block will want lie about in memory: they are asked for a block ahead.
-void ContactStages::prefetch_bodies(const ContactBlock& block) const {
-  constexpr int kLine = 64;
+// What the coming block's local models and laws read: more contacts than a cache holds stream from memory,
+// and the processor's own prefetching stops at the page that a block fills.
+void ContactStages::prefetch(const ContactBlock& block) const {
+  constexpr std::size_t kLine = 64;
   const auto fetch = [](const void* from, std::size_t size) {
     for (std::size_t at = 0; at < size; at += kLine) __builtin_prefetch(static_cast<const char*>(from) + at);
   };
+  fetch(block.field, kLocalModelSize * sizeof *block.field);
+  fetch(block.field[kStateField], sizeof block - offsetof(ContactBlock, field[kStateField]));
+  if (step_.model != nullptr) fetch(pool_.memory(block, 0), kBlock * pool_.memory_size() * sizeof(double));
+#ifdef TRYB
   for (int lane = 0; lane < kBlock; ++lane) {
     if (!(block.used >> lane & 1)) continue;
     for (const int body : {block.a[lane], block.b[lane]}) {
@@ -349,6 +354,7 @@ void ContactStages::prefetch_bodies(const ContactBlock& block) const {
       if (body < step_.owned) fetch(&sums_[body], sizeof(Accumulator));
     }
   }
+#endif
 }
 
 // Stage (c) for the contacts first to first + kWidth - 1.

@@ -202,7 +202,7 @@ class ContactStages {
   ContactResult search(int a, int b, PairMemory& memory);
   void count(const ContactResult& result, int a, int b);
 
-  void prefetch_bodies(const ContactBlock& block) const;
+  void prefetch(const ContactBlock& block) const;
   void compute_block(ContactBlock& block);
   void serve(const ContactBlock& block, int first, Results& results) const;
   void solve_lane(ContactBlock& block, int lane, Results& results);
