@@ -14,7 +14,7 @@ Vec3 spin_earlier(const Shape& shape, const Vec3& w, double dt) {
 
 }  // namespace
 
-Particle Bodies::particle(int i) const {
+Particle Bodies::read(int i) const {
   Particle p;
   p.shape = arrays_.shapes[arrays_.shape[i]];
   p.scale = arrays_.scale[i];
@@ -40,7 +40,7 @@ void Bodies::update(const BodyArrays& arrays, double dt, bool renumbered) {
 void Bodies::update(int i, double dt, bool renumbered) {
   BodyRecord& r = records_[i];
   Known& known = known_[i];
-  const Particle p = particle(i);
+  const Particle p = read(i);
   const Shape& shape = *p.shape;
   if (renumbered || known.scale != p.scale || known.shape != p.shape) {
     reshaped_ = reshaped_ || !renumbered;

@@ -25,6 +25,10 @@ struct LineAllocator {
 template <class T>
 using LineVector = std::vector<T, LineAllocator<T>>;
 
+inline void prefetch_lines(const void* from, std::size_t size) {
+  for (std::size_t at = 0; at < size; at += 64) __builtin_prefetch(static_cast<const char*>(from) + at);
+}
+
 // The bodies as a host holds them, owned ones first. Lab axes; `quaternion` w x y z turns shape axes into the
 // lab's, unit. Arrays are contiguous, three (four) numbers a body.
 struct BodyArrays {
@@ -59,7 +63,15 @@ class Bodies {
   int count() const { return static_cast<int>(records_.size()); }
   const BodyRecord& record(int i) const { return records_[i]; }
   const BodyArrays& arrays() const { return arrays_; }
-  Particle particle(int i) const;
+  // Asks for what particle(i) reads.
+  void prefetch(int i) const {
+    __builtin_prefetch(&records_[i]);
+    __builtin_prefetch(&known_[i]);
+  }
+  Particle particle(int i) const {
+    const Known& k = known_[i];
+    return {k.shape, k.scale, Vec3::Map(records_[i].x), Quat(k.q[0], k.q[1], k.q[2], k.q[3])};
+  }
 
   // A way that no point of the body has exceeded since the last renumbering, centre's path and turns
   // together.
@@ -71,17 +83,18 @@ class Bodies {
   std::size_t bytes() const;
 
  private:
-  struct Known {
+  struct alignas(64) Known {
     double q[4];
     double scale;
     const Shape* shape;
     std::uint64_t stamp;
   };
+  Particle read(int i) const;
   void update(int i, double dt, bool renumbered);
 
   BodyArrays arrays_;
   LineVector<BodyRecord> records_;
-  std::vector<Known> known_;
+  LineVector<Known> known_;
   std::vector<double> path_;
   bool reshaped_ = false;
 };

@@ -182,6 +182,13 @@ void ContactStages::check_stamps() {
 // --- stage (b)
 // -----------------------------------------------------------------------------------------------
 
+// What a look at a pair, or its solution, reads.
+void ContactStages::prefetch_pair(int a, int b, const PairProof* proof) const {
+  if (a >= 0) step_.bodies->prefetch(a);
+  step_.bodies->prefetch(b);
+  prefetch_lines(proof, sizeof *proof);
+}
+
 void ContactStages::check_budgets() {
   const double* path = step_.bodies->path();
   const int count = static_cast<int>(a_.size());
@@ -198,8 +205,13 @@ void ContactStages::check_budgets() {
     int over = 0;
     for (int n = 0; n < kRun; ++n) over += !(path[a[n]] + path[b[n]] < expiry[n]);
     if (over == 0) continue;
-    for (int n = 0; n < kRun; ++n)
-      if (!(path[a[n]] + path[b[n]] < expiry[n])) look(k + n);
+    int expired[kRun], found = 0;
+    for (int n = 0; n < kRun; ++n) {
+      if (path[a[n]] + path[b[n]] < expiry[n]) continue;
+      prefetch_pair(a[n], b[n], proofs_[k + n]);
+      expired[found++] = k + n;
+    }
+    for (int n = 0; n < found; ++n) look(expired[n]);
   }
   for (; k < count; ++k)
     if (!(path[a_[k]] + path[b_[k]] < expiry_[k])) look(k);
@@ -338,23 +350,10 @@ void ContactStages::end_step(double neighbours) {
 // What the coming block's local models and laws read: more contacts than a cache holds stream from memory,
 // and the processor's own prefetching stops at the page that a block fills.
 void ContactStages::prefetch(const ContactBlock& block) const {
-  constexpr std::size_t kLine = 64;
-  const auto fetch = [](const void* from, std::size_t size) {
-    for (std::size_t at = 0; at < size; at += kLine) __builtin_prefetch(static_cast<const char*>(from) + at);
-  };
-  fetch(block.field, kLocalModelSize * sizeof *block.field);
-  fetch(block.field[kStateField], sizeof block - offsetof(ContactBlock, field[kStateField]));
-  if (step_.model != nullptr) fetch(pool_.memory(block, 0), kBlock * pool_.memory_size() * sizeof(double));
-#ifdef TRYB
-  for (int lane = 0; lane < kBlock; ++lane) {
-    if (!(block.used >> lane & 1)) continue;
-    for (const int body : {block.a[lane], block.b[lane]}) {
-      if (body < 0) continue;
-      fetch(&step_.bodies->record(body), sizeof(BodyRecord));
-      if (body < step_.owned) fetch(&sums_[body], sizeof(Accumulator));
-    }
-  }
-#endif
+  prefetch_lines(block.field, kLocalModelSize * sizeof *block.field);
+  prefetch_lines(block.field[kStateField], sizeof block - offsetof(ContactBlock, field[kStateField]));
+  if (step_.model != nullptr)
+    prefetch_lines(pool_.memory(block, 0), kBlock * pool_.memory_size() * sizeof(double));
 }
 
 // Stage (c) for the contacts first to first + kWidth - 1.
@@ -422,6 +421,10 @@ void ContactStages::solve_lane(ContactBlock& block, int lane, Results& results) 
 void ContactStages::compute_block(ContactBlock& block) {
   Results results;
   for (int first = 0; first < kBlock; first += kWidth) serve(block, first, results);
+  for (int lane = 0; lane < kBlock; ++lane) {
+    if (!(block.used >> lane & 1) || results.served[lane] != 0 || block.fresh[lane] != 0) continue;
+    prefetch_pair(block.a[lane], block.b[lane], block.proof[lane]);
+  }
   double touching = 0;
   for (int lane = 0; lane < kBlock; ++lane) {
     if (!(block.used >> lane & 1)) {

@@ -203,6 +203,7 @@ class ContactStages {
   void count(const ContactResult& result, int a, int b);
 
   void prefetch(const ContactBlock& block) const;
+  void prefetch_pair(int a, int b, const PairProof* proof) const;
   void compute_block(ContactBlock& block);
   void serve(const ContactBlock& block, int first, Results& results) const;
   void solve_lane(ContactBlock& block, int lane, Results& results);
