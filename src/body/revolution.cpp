@@ -12,7 +12,10 @@
 namespace nurbs {
 namespace {
 
-using Row = Bernstein<double>;
+// Longer than double: what is left of the differences is the surface's own round-off, not theirs.
+using Real = long double;
+using Row = std::vector<Real>;
+using Point = Eigen::Matrix<Real, 3, 1>;
 
 // Line number i of a patch's control points across the arcs.
 std::vector<Vec4> line_of(const BezierPatch& patch, bool arcs_in_u, int i) {
@@ -22,42 +25,63 @@ std::vector<Vec4> line_of(const BezierPatch& patch, bool arcs_in_u, int i) {
   return line;
 }
 
+// Of polynomials in Bernstein form.
 Row times(const Row& a, const Row& b) {
-  return multiply(a, b, [](double x, double y) { return x * y; });
+  const int p = static_cast<int>(a.size()) - 1, q = static_cast<int>(b.size()) - 1;
+  Row product(a.size() + b.size() - 1, 0);
+  for (int i = 0; i <= p; ++i)
+    for (int k = 0; k <= q; ++k)
+      product[i + k] += a[i] * b[k] * binomial(p, i) * binomial(q, k) / binomial(p + q, i + k);
+  return product;
 }
 
+// The axis and two directions that make a frame with it.
+struct Axes {
+  Point point, axis, t, s;
+  explicit Axes(const Revolution& about) : point(about.point.cast<Real>()) {
+    axis = about.axis.cast<Real>().normalized();
+    t = axis.unitOrthogonal();
+    s = axis.cross(t);
+  }
+};
+
 // Height, weight, and the two coordinates across the axis, homogeneous, along one such line. Points within
-// `noise` of the axis are moved onto it, and the surface by no more.
+// `noise` of the axis are moved onto it, and the surface by no more than the furthest of them.
 struct Coordinates {
   Row x, y, z, w;
-  Coordinates(const std::vector<Vec4>& line, const Vec3& t, const Vec3& s, const Revolution& about,
-              double noise) {
+  Real moved = 0;
+  Coordinates(const std::vector<Vec4>& line, const Axes& axes, double noise) {
     for (const Vec4& p : line) {
-      const Vec3 from = p.head<3>() - p[3] * about.point;
-      const double px = t.dot(from), py = s.dot(from);
-      const bool on_axis = std::hypot(px, py) <= noise * p[3];
+      const Real weight = p[3];
+      const Point from = p.head<3>().cast<Real>() - weight * axes.point;
+      const Real px = axes.t.dot(from), py = axes.s.dot(from), off = std::hypot(px, py) / weight;
+      const bool on_axis = off <= noise;
+      if (on_axis) moved = std::max(moved, off);
       x.push_back(on_axis ? 0 : px);
       y.push_back(on_axis ? 0 : py);
-      z.push_back(about.axis.dot(from));
-      w.push_back(p[3]);
+      z.push_back(axes.axis.dot(from));
+      w.push_back(weight);
     }
   }
 };
 
-void add(double factor, const Row& a, Row* sum) {
-  if (sum->empty()) sum->resize(a.size(), 0.0);
+void add(Real factor, const Row& a, Row* sum) {
+  if (sum->empty()) sum->resize(a.size(), 0);
   for (size_t k = 0; k < a.size(); ++k) (*sum)[k] += factor * a[k];
 }
 
 // How far points of the patch leave the arcs they should be on, a length; infinite where that is not small.
 double off_arcs(const BezierPatch& patch, bool arcs_in_u, const Revolution& about, double size) {
-  const Vec3 t = about.axis.unitOrthogonal(), s = about.axis.cross(t);
+  const Axes axes(about);
   const int n = arcs_in_u ? patch.degree_u : patch.degree_v;
   std::vector<Coordinates> lines;
-  const double noise = kArcRoundoff * size;
-  for (int i = 0; i <= n; ++i) lines.emplace_back(line_of(patch, arcs_in_u, i), t, s, about, noise);
+  Real moved = 0;
+  for (int i = 0; i <= n; ++i) {
+    lines.emplace_back(line_of(patch, arcs_in_u, i), axes, kArcRoundoff * size);
+    moved = std::max(moved, lines.back().moved);
+  }
   const Coordinates& first = lines[0];
-  double height = 0;  // relative to the weights' product, coefficient by coefficient
+  Real height = 0;  // relative to the weights' product, coefficient by coefficient
   for (const Coordinates& line : lines) {
     const Row a = times(line.z, first.w), b = times(first.z, line.w), w = times(line.w, first.w);
     for (size_t k = 0; k < a.size(); ++k) height = std::max(height, std::abs(a[k] - b[k]) / w[k]);
@@ -65,11 +89,11 @@ double off_arcs(const BezierPatch& patch, bool arcs_in_u, const Revolution& abou
   const Row w2 = times(first.w, first.w);
   Row r2 = times(first.x, first.x);
   add(1, times(first.y, first.y), &r2);
-  double across = 0;  // relative to the squared radius
+  Real across = 0;  // relative to the squared radius
   for (int m = 0; m <= 2 * n; ++m) {
     Row squares, weights;
     for (int i = std::max(0, m - n); i <= std::min(n, m); ++i) {
-      const double share = binomial(n, i) * binomial(n, m - i) / binomial(2 * n, m);
+      const Real share = static_cast<Real>(binomial(n, i)) * binomial(n, m - i) / binomial(2 * n, m);
       const Coordinates &a = lines[i], &b = lines[m - i];
       add(share, times(a.x, b.x), &squares);
       add(share, times(a.y, b.y), &squares);
@@ -77,13 +101,17 @@ double off_arcs(const BezierPatch& patch, bool arcs_in_u, const Revolution& abou
     }
     const Row left = times(squares, w2), right = times(r2, weights);
     for (size_t k = 0; k < left.size(); ++k) {
-      const double off = std::abs(left[k] - right[k]);
+      const Real off = std::abs(left[k] - right[k]);
       if (!(off > 0)) continue;
       if (!(right[k] > 0)) return std::numeric_limits<double>::infinity();
       across = std::max(across, off / right[k]);
     }
   }
-  const double error = height + across * size + noise;
+  Real widest = 0;
+  for (size_t k = 0; k < first.w.size(); ++k)
+    widest = std::max(widest, std::hypot(first.x[k], first.y[k]) / first.w[k]);
+  // Relatively, a radius errs by half of what its square does.
+  const auto error = static_cast<double>(height + 0.5L * across * widest + moved);
   return std::isfinite(error) ? error : std::numeric_limits<double>::infinity();
 }
 

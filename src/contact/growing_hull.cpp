@@ -12,34 +12,57 @@ int count_positive(const Vec3& w) {
   return (w[0] > 0) + (w[1] > 0) + (w[2] > 0);
 }
 
+// Twice the area times the normal, from the two shorter edges: of a needle, the longer ones differ by less
+// than their round-off.
+Vec3 normal_of(const Vec3& a, const Vec3& b, const Vec3& c) {
+  const Vec3 ab = b - a, bc = c - b, ca = a - c;
+  const double lab = ab.squaredNorm(), lbc = bc.squaredNorm(), lca = ca.squaredNorm();
+  if (lbc >= lab && lbc >= lca) return ca.cross(ab);
+  return lca >= lab ? ab.cross(bc) : bc.cross(ca);
+}
+
 }  // namespace
 
+// Corners may be a million times as far from the origin as its nearest point: differences are taken from the
+// corner nearest to the origin, where they keep their digits, and the normal is of the two shorter edges.
 Vec3 nearest_on_triangle(const Vec3& a, const Vec3& b, const Vec3& c) {
-  const Vec3 ab = b - a, ac = c - a;
-  const double d1 = -ab.dot(a), d2 = -ac.dot(a);
-  if (d1 <= 0 && d2 <= 0) return {1, 0, 0};
-  const double d3 = -ab.dot(b), d4 = -ac.dot(b);
-  if (d3 >= 0 && d4 <= d3) return {0, 1, 0};
-  const double vc = d1 * d4 - d3 * d2;
-  if (vc <= 0 && d1 >= 0 && d3 <= 0) {
-    const double t = d1 / (d1 - d3);
-    return {1 - t, t, 0};
+  const Vec3* const corner[3] = {&a, &b, &c};
+  const double far[3] = {a.squaredNorm(), b.squaredNorm(), c.squaredNorm()};
+  const int i = far[0] <= far[1] ? (far[0] <= far[2] ? 0 : 2) : (far[1] <= far[2] ? 1 : 2), j = (i + 1) % 3,
+            k = (i + 2) % 3;
+  const Vec3 &p = *corner[i], &q = *corner[j], &r = *corner[k];
+  const Vec3 pq = q - p, pr = r - p;
+  const double dq = -pq.dot(p), dr = -pr.dot(p);
+  Vec3 w = Vec3::Zero();
+  w[i] = 1;
+  if (dq <= 0 && dr <= 0) return w;
+  const Vec3 n = normal_of(a, b, c);
+  const auto on_edge = [&](int to, double t) {
+    w[to] = t;
+    w[i] = 1 - t;
+    return w;
+  };
+  // q and r are further away than p: no other corner can be the nearest, nor an edge's far half from p.
+  const double wr = n.dot(p.cross(pq)), wq = n.dot(pr.cross(p));
+  if (wr <= 0 && dq >= 0) return on_edge(j, dq / pq.squaredNorm());
+  if (wq <= 0 && dr >= 0) return on_edge(k, dr / pr.squaredNorm());
+  const Vec3 qr = r - q;
+  const double wp = n.dot((far[j] <= far[k] ? q : r).cross(qr));
+  if (wp <= 0) {
+    const double length2 = qr.squaredNorm();
+    const double t = far[j] <= far[k] ? -qr.dot(q) / length2 : 1 - qr.dot(r) / length2;
+    if (!(t >= 0 && t <= 1)) return w;
+    w[i] = 0;
+    w[j] = 1 - t;
+    w[k] = t;
+    return w;
   }
-  const double d5 = -ab.dot(c), d6 = -ac.dot(c);
-  if (d6 >= 0 && d5 <= d6) return {0, 0, 1};
-  const double vb = d5 * d2 - d1 * d6;
-  if (vb <= 0 && d2 >= 0 && d6 <= 0) {
-    const double t = d2 / (d2 - d6);
-    return {1 - t, 0, t};
-  }
-  const double va = d3 * d6 - d5 * d4;
-  if (va <= 0 && d4 - d3 >= 0 && d5 - d6 >= 0) {
-    const double t = (d4 - d3) / ((d4 - d3) + (d5 - d6));
-    return {0, 1 - t, t};
-  }
-  const double sum = va + vb + vc;
-  if (!(sum > 0)) return {1, 0, 0};
-  return {va / sum, vb / sum, vc / sum};
+  const double sum = wp + wq + wr;
+  if (!(sum > 0)) return w;
+  w[i] = wp / sum;
+  w[j] = wq / sum;
+  w[k] = wr / sum;
+  return w;
 }
 
 int GrowingHull::store(const Vec3& point) {
@@ -55,7 +78,7 @@ void GrowingHull::set(int f, int a, int b, int c) {
   face.alive = true;
   marked_[f] = false;
   const Vec3 &p = point_[a], &q = point_[b], &r = point_[c];
-  const Vec3 m = (q - p).cross(r - p);
+  const Vec3 m = normal_of(p, q, r);
   const double area2 = m.squaredNorm();
   const double base2 = std::max({(q - p).squaredNorm(), (r - q).squaredNorm(), (p - r).squaredNorm()});
   face.sliver = !(area2 > sliver_ * sliver_ * base2);

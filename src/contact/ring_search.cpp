@@ -134,7 +134,9 @@ class RingSearch {
       : pair_(pair), view_(pair, k_is_a), tolerance_(tolerance) {
     tangent_ = view_.axis.unitOrthogonal();
     second_ = view_.axis.cross(tangent_);
-    noise_ = 4 * kRoundoff * pair.reach + view_.scale_k * view_.k->revolution.error +
+    noise_ = 2 * kRoundoff *
+                 (view_.scale_k * view_.k->bounding_radius + view_.scale_m * view_.m->bounding_radius) +
+             view_.scale_k * view_.k->revolution.error +
              (view_.circles ? view_.scale_m * view_.m->revolution.error : 0.0);
   }
 

@@ -143,7 +143,8 @@ constexpr double kUnitTurn = 1e-14;  // of a quaternion's squared length: within
 
 // --- certificate
 constexpr double kLeastTolerance =
-    6 * kRoundoff;  // of the larger radius: no bracket of the gap can be narrower
+    10 * kRoundoff;  // of the larger radius: no bracket of the gap can be narrower. Two supports lack up to 2
+                     // kSupportSlack each, the search over directions and bodies of revolution the rest
 constexpr double kNoDirection =
     1e-10;  // a vector shorter than this, relative to the larger body, is mostly round-off
 

@@ -92,6 +92,48 @@ TEST(GrowingHull, stays_closed_and_inside_on_a_lattice) {
   }
 }
 
+// Needles between a small body's details and a corner of one a million times as large, whose nearest point to
+// the origin is known: the plane of the triangle is `height` away, its foot inside or beside an edge.
+TEST(GrowingHull, needles_know_their_plane_and_their_nearest_point) {
+  Random random(4);
+  for (int k = 0; k < 2000; ++k) {
+    const double length = random.log_uniform(1, 1e6), width = random.log_uniform(1e-6, 1),
+                 height = random.log_uniform(1e-6, 1);
+    const int where = k % 3;
+    const double back = where == 1 ? random.uniform(1, 2) * width : random.log_uniform(1e-6, 1);
+    const Quat turn = random.turn();
+    const auto at = [&](double x, double y) -> Vec3 { return turn * Vec3(x, y, height); };
+    // The foot is inside, beside a long edge, or before the short one.
+    const double shift = where == 1 ? 2 * width : 0;
+    const Vec3 tip = at(length, shift), low = at(where == 2 ? back : -back, shift - width),
+               high = at(where == 2 ? back : -back, shift + width);
+    Vec3 corner[3] = {tip, low, high};
+    std::rotate(corner, corner + k % 5 % 3, corner + 3);
+    double nearest = height;
+    if (where == 1) {
+      const double along = length + back,
+                   off = (2 * width * along - width * length) / std::hypot(along, width);
+      nearest = std::hypot(height, off);
+    } else if (where == 2) {
+      nearest = std::hypot(height, back);
+    }
+    const Vec3 w = nearest_on_triangle(corner[0], corner[1], corner[2]);
+    EXPECT_NEAR(w.sum(), 1, 1e-15);
+    EXPECT_GE(w.minCoeff(), 0);
+    const double found = (w[0] * corner[0] + w[1] * corner[1] + w[2] * corner[2]).norm();
+    const double allowed = 1e-14 + 4e-16 / width * nearest;  // the corners' own round-off
+    EXPECT_NEAR(found, nearest, allowed) << k << ": " << length << " x " << width << ", " << height;
+    GrowingHull hull(1e-13 * length);
+    for (const Vec3& c : corner) hull.store(c);
+    hull.store(turn * Vec3(0, 0, -length));
+    ASSERT_TRUE(hull.start(0, 1, 2, 3));
+    const GrowingHull::Face& f = hull.face(0);
+    if (!f.sliver) {
+      EXPECT_NEAR(f.offset, height, 4e-16 * length + allowed) << k << ": " << length << " x " << width;
+    }
+  }
+}
+
 TEST(GrowingHull, four_points_of_a_plane_are_no_start) {
   GrowingHull hull(kSliverHeight);
   for (const Vec3& p : {Vec3(0, 0, 0), Vec3(1, 0, 0), Vec3(0, 1, 0), Vec3(1, 1, 0), Vec3(0, 0, 1)})
