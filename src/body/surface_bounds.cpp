@@ -14,6 +14,9 @@ constexpr double kInfinity = std::numeric_limits<double>::infinity();
 // Cells spent on the least radius, over kMostCells: loose, it costs every turning contact of the body a cold
 // solve.
 constexpr int kLeastRadiusBudget = 4;
+// The same for the proof of convexity, where no hollow is seen: without it every support is doubted.
+constexpr int kConvexBudget = 6;
+constexpr double kBent = 1e-3;  // over the bounding radius: a curvature worth it
 
 struct Open {
   Leaf leaf;
@@ -62,27 +65,46 @@ bool in_pole_strip(const Shape& shape, const Cell& c) {
          (links[2].collapsed && c.v0 < kPoleStrip) || (links[3].collapsed && c.v0 + c.dv > 1 - kPoleStrip);
 }
 
-// Halves of a leaf the better way: where little is proven yet both ways are tried, since a needle's cells are
-// a thousand times longer than wide.
+// What holds all over a cell holds in its halves, whose own bounds may be wider where they are bent strips.
+void inherit(const CellBounds& whole, CellBounds* half) {
+  if (whole.regular && (!half->regular || half->cone > whole.cone)) {
+    half->regular = true;
+    half->axis = whole.axis;
+    half->cone = whole.cone;
+  }
+  half->convex = half->convex || whole.convex;
+  half->min_radius = std::max(half->min_radius, whole.min_radius);
+  half->max_radius = std::min(half->max_radius, whole.max_radius);
+  half->least_curvature = std::max(half->least_curvature, whole.least_curvature);
+  half->rate = std::min(half->rate, whole.rate);
+  half->speed_u = std::max(half->speed_u, whole.speed_u);
+  half->speed_v = std::max(half->speed_v, whole.speed_v);
+}
+
+// Halves of a leaf the better way: where little is known yet both ways are tried, since a needle's cells are
+// a thousand times longer than wide. A way is as good as the better half: the other one may hold what makes
+// the doubt. Where neither helps the cell is a strip that bends more than it is wide, and is cut across.
 std::pair<Leaf, Leaf> split(const BezierPatch& patch, const Leaf& leaf, bool with_rate, int* cells) {
-  const auto bound = [&](Leaf* l) {
-    ++*cells;
-    l->bounds = enclose(patch, l->cell, with_rate);
-  };
   const auto halves = [&](bool in_u) {
     auto [a, b] = halve(patch, leaf.cell, in_u);
     std::pair<Leaf, Leaf> pair{{std::move(a), {}, {}}, {std::move(b), {}, {}}};
-    bound(&pair.first);
-    bound(&pair.second);
+    for (Leaf* half : {&pair.first, &pair.second}) {
+      ++*cells;
+      half->bounds = enclose(patch, half->cell, with_rate);
+      inherit(leaf.bounds, &half->bounds);
+    }
     return pair;
   };
-  std::pair<Leaf, Leaf> best = halves(leaf.bounds.split_u);
-  if (leaf.bounds.convex && leaf.bounds.cone < kWideCone) return best;
-  std::pair<Leaf, Leaf> other = halves(!leaf.bounds.split_u);
+  const bool in_u = leaf.bounds.split_u;
+  std::pair<Leaf, Leaf> best = halves(in_u);
+  if ((leaf.bounds.convex || leaf.bounds.doubt < kLittleDoubt) && leaf.bounds.cone < kWideCone) return best;
+  std::pair<Leaf, Leaf> other = halves(!in_u);
   const auto doubt = [](const std::pair<Leaf, Leaf>& p) {
-    return p.first.bounds.doubt + p.second.bounds.doubt;
+    return std::min(p.first.bounds.doubt, p.second.bounds.doubt);
   };
-  return doubt(other) < doubt(best) ? other : best;
+  const bool neither = std::min(doubt(best), doubt(other)) >= leaf.bounds.doubt;
+  const bool turn = neither ? (leaf.cell.du >= leaf.cell.dv) != in_u : doubt(other) < doubt(best);
+  return turn ? other : best;
 }
 
 // u = r s / (1 + (r - 1) s), s the parameter of the even patch.
@@ -130,7 +152,9 @@ class Bounder {
       }
     const int most = kMostCells + kMostCellsPerPatch * patches_;
     if (!sphere_) halve_while([this](const Open& o) { return least_loose(o); }, kLeastRadiusBudget * most);
-    halve_while([this](const Open& o) { return unproven(o); }, std::max(most, out_.cells + most / 2));
+    const int base = std::max(most, out_.cells + most / 2);
+    halve_while([this](const Open& o) { return o.depth < kDeepestUnproven && unproven(o); }, base);
+    halve_while([this](const Open& o) { return !hollow_ && unproven(o) && bent(o); }, kConvexBudget * most);
     halve_while([this](const Open& o) { return radii_loose(o); }, std::max(most, out_.cells + most / 2));
     begin_rates();
     const int enough = out_.cells + kMostRateCells + kMostCellsPerPatch * patches_;
@@ -149,7 +173,9 @@ class Bounder {
     with_rates_ = true;
     for (Open& o : open_) {
       if (!o.leaf.bounds.convex || !wants_rate(o.leaf.cell)) continue;
-      o.leaf.bounds = enclose(out_.even[o.leaf.cell.patch], o.leaf.cell, true);
+      CellBounds rated = enclose(out_.even[o.leaf.cell.patch], o.leaf.cell, true);
+      inherit(o.leaf.bounds, &rated);
+      o.leaf.bounds = rated;
       see_rate(o.leaf);
     }
   }
@@ -165,6 +191,7 @@ class Bounder {
     if (b.seen_curvature > 0) {
       out_.seen_max = std::max(out_.seen_max, b.seen_max);
     }
+    if (b.seen_curvature < -kCurvatureNoise / shape_.bounding_radius) hollow_ = true;
     see_rate(leaf);
     open_.push_back({std::move(leaf), depth});
   }
@@ -195,9 +222,10 @@ class Bounder {
 
   bool unproven(const Open& o) const {
     const CellBounds& b = o.leaf.bounds;
-    return !b.convex && o.depth < kDeepestUnproven && b.seen_curvature > 0 &&
-           !is_flat(b, shape_.bounding_radius);
+    return !b.convex && b.seen_curvature > 0 && !is_flat(b, shape_.bounding_radius);
   }
+
+  bool bent(const Open& o) const { return o.leaf.bounds.seen_curvature > kBent / shape_.bounding_radius; }
 
   bool radii_loose(const Open& o) const {
     const CellBounds& b = o.leaf.bounds;
@@ -264,7 +292,7 @@ class Bounder {
 
   const Shape& shape_;
   const int patches_;
-  bool with_rates_ = false, sphere_ = false;
+  bool with_rates_ = false, sphere_ = false, hollow_ = false;
   std::vector<std::pair<Change, Change>> changes_;
   std::vector<Open> open_;
   std::vector<double> seen_rate_;

@@ -198,6 +198,27 @@ TEST(Radii, of_nearly_flat_faces_are_proven) {
   }
 }
 
+// Fits of rough grains' hulls: cells there can be strips that bend more than they are wide, which halving
+// along themselves for ever leaves without any bound. With no ball known that rolls inside, every contact
+// took the fallback: a hundred times as long.
+TEST(Radii, of_fitted_grains_are_proven) {
+  for (const char* file : {"examples/shapes/sand_grain.json", "examples/shapes/asteroid.json"}) {
+    const ShapePointer s = read_shape_file(file);
+    EXPECT_TRUE(s->proofs.convex) << file;
+    EXPECT_TRUE(proven_without_dents(*s)) << file;
+    EXPECT_GE(s->patch_curvature.min_radius, s->proofs.seen_min / 1.2) << file;
+    EXPECT_LT(s->proofs.cells, 250000) << file;
+    // Against dense sampling: no curvature radius below the bound, none negative.
+    Random random(3);
+    for (int k = 0; k < 20000; ++k) {
+      const int patch = random.below(static_cast<int>(s->patches.size()));
+      const LocalForm f = local_form(s->patches[patch], random.uniform(0, 1), random.uniform(0, 1));
+      EXPECT_GT(f.k_min, 0);
+      EXPECT_LE(f.k_max * s->patch_curvature.min_radius, 1);
+    }
+  }
+}
+
 // --- spikes between samples
 // ----------------------------------------------------------------------------------------------------
 
