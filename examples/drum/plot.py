@@ -1,5 +1,5 @@
 #!/usr/bin/python3
-"""Dynamic angle of the runs of in.drum, and a picture: plot.py FOLDER. Reads FOLDER/SHAPE/drum.dump."""
+"""Dynamic angle of the runs of in.drum, and a picture: plot.py FOLDER. Reads FOLDER/SHAPE-SEED/drum.dump."""
 import pathlib
 import sys
 
@@ -22,19 +22,20 @@ def angles(file):
 
 
 def main(folder):
+    runs = {}
+    for file in sorted(folder.glob("*-*/drum.dump")):
+        runs.setdefault(file.parent.name.split("-")[0], []).append(np.abs(list(angles(file))).mean())
     with open(folder / "angles.csv", "w") as f:
-        print("shape,angle_degrees,error,frames", file=f)
+        print("shape,angle_degrees,error,seeds", file=f)
         for shape in ("sphere", "flat", "long"):
-            if not (folder / shape / "drum.dump").exists():
-                continue
-            a = np.abs(list(angles(folder / shape / "drum.dump")))
-            parts = [p.mean() for p in np.array_split(a, 8)]  # frames follow each other closely
-            error = np.std(parts, ddof=1) / np.sqrt(len(parts))
-            print(f"{shape},{a.mean():.2f},{error:.2f},{len(a)}", file=f)
-            print(f"{shape:8} dynamic angle {a.mean():.1f} +- {error:.1f} degrees over {len(a)} frames")
-    show = "long"
-    draw(sorted((folder / show).glob("drum-*.vtu"), key=lambda p: int(p.stem.split("-")[1]))[-1], folder / "drum.png",
-         towards=(0, -1, 0), walls=[folder / show / "drum.stl"], zoom=1.4)
+            if shape in runs:
+                a = np.array(runs[shape])
+                error = a.std(ddof=1) / np.sqrt(len(a)) if len(a) > 1 else float("nan")
+                print(f"{shape},{a.mean():.2f},{error:.2f},{len(a)}", file=f)
+                print(f"{shape:8} dynamic angle {a.mean():.1f} +- {error:.1f} degrees ({len(a)} seeds)")
+    show = min(folder.glob("long-*"))
+    draw(sorted(show.glob("drum-*.vtu"), key=lambda p: int(p.stem.split("-")[1]))[-1], folder / "drum.png",
+         towards=(0, -1, 0), walls=[show / "drum.stl"], zoom=1.4)
 
 
 if __name__ == "__main__":

@@ -89,26 +89,28 @@ void ContactStages::end_neighbours() {
     int size = 0;
     old.pack(proof.contact, record);
     proof.contact = pool_.unpack(record, &size);
-    bind(static_cast<int>(k));
+    bind_neighbour(static_cast<int>(k));
     expiry_[k] = kInfinity;
   }
   renewed_ = true;
 }
 
-// Tells the contact of neighbour k, and its polygon, whose it is.
-void ContactStages::bind(int k) {
-  const std::int32_t number = proofs_[k]->contact;
+// Tells a contact, and its polygon, whose it is.
+void ContactStages::bind(std::int32_t number, PairProof* proof, int neighbour, int a, int b, int law) {
   const auto set = [&](ContactBlock& block, int lane) {
-    block.proof[lane] = proofs_[k];
-    block.neighbour[lane] = k;
-    block.a[lane] = a_[k];
-    block.b[lane] = b_[k];
-    block.law[lane] = 0;
+    block.proof[lane] = proof;
+    block.neighbour[lane] = neighbour;
+    block.a[lane] = a;
+    block.b[lane] = b;
+    block.law[lane] = law;
     block.fresh[lane] = 0;
   };
   set(pool_.block(number), ContactPool::lane(number));
   if (FlatContact* flat = pool_.flat(number))
     for (int lane = 0; lane < kBlock; ++lane) set(flat->points, lane);
+}
+void ContactStages::bind_neighbour(int k) {
+  bind(proofs_[k]->contact, proofs_[k], k, a_[k], b_[k], 0);
 }
 
 void ContactStages::set_law(int k) {
@@ -271,7 +273,7 @@ void ContactStages::look(int k) {
   }
   ContactRecord record{memory.model, memory.on_a, memory.on_b, {}, {0, 0, 0}, 1, 0};
   proof.contact = pool_.add(record);
-  bind(k);
+  bind_neighbour(k);
   set_law(k);
   fresh_.push_back(r);
   pool_.block(proof.contact).fresh[ContactPool::lane(proof.contact)] = static_cast<int>(fresh_.size());
@@ -507,14 +509,14 @@ void ContactStages::start_run(ContactBlock& block, int lane, const Results& resu
   if (state.active == 0) {
     return;
   }
-  const double sign = block.field[kWeight][lane] < 0 ? -1 : 1;
-  const Vec3 force = sign * force_on_b(state);
+  const int sign_of = sign(block, lane);
+  const Vec3 force = sign_of * force_on_b(state);
   double load_b[8], load_a[8];
   store(force, load_b);
   store(Vec3(load(state.arm_b).cross(force)), load_b + 3);
   store(Vec3(-force), load_a);
   store(Vec3(-load(state.arm_a).cross(force)), load_a + 3);
-  load_a[6] = load_b[6] = sign * state.normal_force;
+  load_a[6] = load_b[6] = sign_of * state.normal_force;
   load_a[7] = load_b[7] = 1;
   add_load(a, load_a);
   add_load(b, load_b);
@@ -530,7 +532,7 @@ void ContactStages::close(ContactBlock& block, int lane) {
   if (step_.ledger) {
     EnergyLedger work;
     end_contact(coefficients(block, lane), motion_of(record(a)), motion_of(record(b)), step_.dt, state, work);
-    dissipated_.add(work, block.field[kWeight][lane] < 0 ? -share(a, b) : share(a, b));
+    dissipated_.add(work, sign(block, lane) * share(a, b));
   }
   state = ContactState{};
   block.set(lane, kStateField, kContactStateSize, &state);

@@ -192,8 +192,11 @@ class ContactStages {
   double smaller_radius(int a, int b) const;
 
   ContactCoefficients coefficients(const ContactBlock& block, int lane) const;
+  // -1 of a contact that takes off what others count twice.
+  static int sign(const ContactBlock& block, int lane) { return block.field[kWeight][lane] < 0 ? -1 : 1; }
 
-  void bind(int k);
+  void bind(std::int32_t number, PairProof* proof, int neighbour, int a, int b, int law);
+  void bind_neighbour(int k);
   void set_law(int k);
   void check_stamps();
   void check_budgets();
@@ -255,7 +258,11 @@ class ContactStages {
   void bind_listed(std::int32_t number, int body);
   void drop_listed(std::int32_t number);
   void end_listed(std::int32_t number);
-  void inherit(std::int32_t number, std::int32_t parent, const WallContact& found);
+  struct Former;
+  int list_former(int body, std::int32_t head, Former* former);
+  void pair_up(int body, Former* former, int formers, const WallContact* found, int count, bool balanced,
+               std::int32_t* number) const;
+  void inherit(std::int32_t number, int body, const Former* former, int formers, const WallContact& found);
   void count_listed(const WallContact& found, std::int32_t number, int body);
   void update_listed(std::int32_t number, int body, const WallContact& found);
 

@@ -127,12 +127,7 @@ bool ContactStages::make_flat(ContactBlock& block, int lane, const Results& sing
   FlatContact& flat = pool_.add_flat(block.proof[lane]->contact);
   flat.polygon = polygon;
   flat.points.used = (1u << polygon.count) - 1;
-  if (a < -1) {
-    bind_listed(-1 - a, b);
-  } else {
-    bind(block.neighbour[lane]);
-    set_law(block.neighbour[lane]);
-  }
+  bind(block.proof[lane]->contact, block.proof[lane], block.neighbour[lane], a, b, block.law[lane]);
   if (old.active != 0 && step_.model != nullptr) {
     double memory[kMostModelMemory];
     std::copy_n(pool_.memory(block, lane), pool_.memory_size(), memory);

@@ -147,8 +147,7 @@ void ContactStages::hold(Holding* h, int body, double energy) {
   }
   double& weight = block.field[kWeight][lane];
   const double before = weight;
-  const int sign = weight < 0 ? -1 : 1;
-  weight = sign * std::max(1.0, h->unit > 0 ? energy / h->unit : 1.0);
+  weight = sign(block, lane) * std::max(1.0, h->unit > 0 ? energy / h->unit : 1.0);
   p.shift = energy < h->unit ? h->geometry.overlap - overlap_of(h->number, body, h->geometry, energy) : 0;
   if (weight == before || step_.model != nullptr) return;
   // The friction spring keeps its force, but gains no energy.

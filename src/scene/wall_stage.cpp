@@ -32,18 +32,8 @@ std::int32_t ContactStages::adopt_listed(std::int32_t number) {
 // Tells the contact, and its polygon, whose it is.
 void ContactStages::bind_listed(std::int32_t number, int body) {
   Partner& p = partner(number);
-  const auto set = [&](ContactBlock& block, int lane) {
-    block.proof[lane] = &p.proof;
-    block.neighbour[lane] = -1;
-    block.a[lane] = -1 - number;
-    block.b[lane] = body;
-    block.law[lane] = step_.laws == nullptr ? 0 : law_of(-1, body);
-    block.fresh[lane] = 0;
-  };
   p.proof.contact = number;
-  set(pool_.block(number), ContactPool::lane(number));
-  if (FlatContact* flat = pool_.flat(number))
-    for (int lane = 0; lane < kBlock; ++lane) set(flat->points, lane);
+  bind(number, &p.proof, -1, -1 - number, body, step_.laws == nullptr ? 0 : law_of(-1, body));
 }
 
 void ContactStages::drop_listed(std::int32_t number) {
@@ -95,18 +85,17 @@ void ContactStages::update_listed(std::int32_t number, int body, const WallConta
   block.fresh[lane] = static_cast<int>(fresh_.size());
 }
 
-void ContactStages::give(int body, std::int32_t* head, WallContact* found, int count, bool balanced) {
-  struct Old {
-    std::int32_t number;
-    Vec3 normal, point;
-    double weight;
-    bool taken, flat;
-  };
-  Old old[kMostListed];
-  int olds = 0;
-  bool reentrant = false;  // some surface is counted twice and taken off: no contact is on its own
+// A contact of the last step on a body's list: where it was, in lab axes.
+struct ContactStages::Former {
+  std::int32_t number;
+  Vec3 normal, point;
+  bool subtracts, flat, taken;
+};
+
+int ContactStages::list_former(int body, std::int32_t head, Former* former) {
   const BodyRecord& b = step_.bodies->record(body);
-  for (std::int32_t n = *head; n != 0 && olds < kMostListed; n = partner(n).next) {
+  int count = 0;
+  for (std::int32_t n = head; n != 0 && count < kMostListed; n = partner(n).next) {
     ContactBlock& block = pool_.block(n);
     const int lane = ContactPool::lane(n);
     block.b[lane] = body;
@@ -119,73 +108,90 @@ void ContactStages::give(int body, std::int32_t* head, WallContact* found, int c
       store(Vec3(load(wall.x) + moved), wall.x);
       partner(n).level += load(state.normal).dot(moved);
     }
-    Vec3 normal = load(state.normal), point = load(wall.x) + load(state.arm_a);
+    Former& f = former[count++];
+    f = {n, load(state.normal), load(wall.x) + load(state.arm_a), sign(block, lane) < 0, false, false};
     if (const FlatContact* flat = pool_.flat(n)) {
       const ContactPolygon& polygon = flat->polygon;
-      normal = load(polygon.normal);
+      f.flat = true;
+      f.normal = load(polygon.normal);
       Vec3 middle = Vec3::Zero();
       for (int k = 0; k < polygon.count; ++k) middle += load(polygon.point[k]) / polygon.count;
       const Particle particle = step_.bodies->particle(body);
-      point = particle.x + particle.scale * (particle.q * middle);
+      f.point = particle.x + particle.scale * (particle.q * middle);
     }
-    old[olds++] = {n, normal, point, block.field[kWeight][lane], false, block.field[kFlat][lane] != 0};
-    reentrant = reentrant || block.field[kWeight][lane] < 0;
   }
-  count = std::min(count, kMostListed);
-  for (int k = 0; k < count; ++k) reentrant = reentrant || found[k].weight < 0;
+  return count;
+}
 
-  // The same piece of the wall, then nearest first.
-  std::int32_t number[kMostListed] = {};
+namespace {
+
+Vec3 middle_of(const ContactResult& r) {
+  return 0.5 * (r.point_a + r.point_b);
+}
+
+}  // namespace
+
+// Which former contact each of those found goes on with: on the same piece of the wall, then nearest first.
+// `number` of those that go on with none stays 0.
+void ContactStages::pair_up(int body, Former* former, int formers, const WallContact* found, int count,
+                            bool balanced, std::int32_t* number) const {
+  const auto alike = [](const Former& f, const WallContact& w) { return f.subtracts == (w.weight < 0); };
   for (int k = 0; k < count && balanced; ++k)
-    for (int i = 0; i < olds && number[k] == 0; ++i) {
-      if (old[i].taken || (old[i].weight < 0) != (found[k].weight < 0)) continue;
-      if ((old[i].flat && !found[k].region) || !same_piece(old[i].number, body, found[k])) continue;
-      old[i].taken = true;
-      number[k] = old[i].number;
+    for (int i = 0; i < formers && number[k] == 0; ++i) {
+      if (former[i].taken || !alike(former[i], found[k])) continue;
+      if ((former[i].flat && !found[k].region) || !same_piece(former[i].number, body, found[k])) continue;
+      former[i].taken = true;
+      number[k] = former[i].number;
     }
-  const auto distance2 = [&](const Old& o, const WallContact& f) {
-    return (o.point - 0.5 * (f.result.point_a + f.result.point_b)).squaredNorm();
-  };
-  for (int pairs = std::min(olds, count); pairs-- > 0;) {
-    int best_old = -1, best_found = -1;
+  for (int pairs = std::min(formers, count); pairs-- > 0;) {
+    int best_former = -1, best_found = -1;
     double least = kFarAway;
-    for (int i = 0; i < olds; ++i)
-      for (int k = 0; k < count && !old[i].taken; ++k) {
-        if (number[k] != 0 || (old[i].weight < 0) != (found[k].weight < 0)) continue;
-        if (old[i].normal.dot(found[k].result.normal) < kSameSide) continue;
-        if (balanced && old[i].flat) continue;  // a polygon stands on its plane
-        const double d = distance2(old[i], found[k]);
-        if (d < least) least = d, best_old = i, best_found = k;
+    for (int i = 0; i < formers; ++i)
+      for (int k = 0; k < count && !former[i].taken; ++k) {
+        if (number[k] != 0 || !alike(former[i], found[k])) continue;
+        if (former[i].normal.dot(found[k].result.normal) < kSameSide) continue;
+        if (balanced && former[i].flat) continue;  // a polygon stands on its plane
+        const double d = (former[i].point - middle_of(found[k].result)).squaredNorm();
+        if (d < least) least = d, best_former = i, best_found = k;
       }
-    if (best_old < 0) break;
-    old[best_old].taken = true;
-    number[best_found] = old[best_old].number;
+    if (best_former < 0) break;
+    former[best_former].taken = true;
+    number[best_found] = former[best_former].number;
   }
+}
 
-  std::int32_t first = 0, *link = &first;
-  bool was_known[kMostListed];
+void ContactStages::give(int body, std::int32_t* head, WallContact* found, int count, bool balanced) {
+  Former former[kMostListed];
+  const int formers = list_former(body, *head, former);
+  count = std::min(count, kMostListed);
+  std::int32_t number[kMostListed] = {};
+  pair_up(body, former, formers, found, count, balanced, number);
+
+  bool known[kMostListed];
   for (int k = 0; k < count; ++k) {
+    known[k] = number[k] != 0;
+    if (known[k]) continue;
     const WallContact& f = found[k];
-    was_known[k] = number[k] != 0;
-    if (was_known[k]) continue;
-    ContactRecord record{f.memory.model, f.memory.on_a, f.memory.on_b, {}, {0, 0, 0}, 1, 0};
-    number[k] = add_listed(record);
+    number[k] = add_listed({f.memory.model, f.memory.on_a, f.memory.on_b, {}, {0, 0, 0}, 1, 0});
     store(f.result.point_a, partner(number[k]).record.x);
     bind_listed(number[k], body);
   }
   if (balanced) {
     double left = 0;
-    for (int i = 0; i < olds && !step_.setup; ++i)
-      if (!old[i].taken) left += leaving_energy(old[i].number, body);
-    balance_found(body, found, number, was_known, count, left);
+    for (int i = 0; i < formers && !step_.setup; ++i)
+      if (!former[i].taken) left += leaving_energy(former[i].number, body);
+    balance_found(body, found, number, known, count, left);
   }
+
+  // Some surface is counted twice and taken off: no contact is on its own.
+  const bool reentrant = std::any_of(former, former + formers, [](const Former& f) { return f.subtracts; }) ||
+                         std::any_of(found, found + count, [](const WallContact& w) { return w.weight < 0; });
   for (int k = 0; k < count; ++k) {
     const WallContact& f = found[k];
-    const bool known = was_known[k];
     const std::int32_t n = number[k];
-    ContactBlock& block = pool_.block(n);
-    const int lane = ContactPool::lane(n);
-    if (!known || !step_.setup) {
+    if (!known[k] || !step_.setup) {
+      ContactBlock& block = pool_.block(n);
+      const int lane = ContactPool::lane(n);
       partner(n).proof = f.memory.proof;
       block.set(lane, 0, kLocalModelSize, &f.memory.model);
       block.set(lane, kLocalModelSize, 10, &f.memory.on_a);
@@ -193,26 +199,16 @@ void ContactStages::give(int body, std::int32_t* head, WallContact* found, int c
     partner(n).proof.contact = n;
     update_listed(n, body, f);
     count_listed(f, n, body);
-    if (!known && reentrant && !step_.setup) {
-      const Old* parent = nullptr;
-      double least = 0.25 * b.radius * b.radius;
-      for (int i = 0; i < olds; ++i) {
-        const double d = distance2(old[i], f);
-        if (old[i].normal.dot(f.result.normal) >= kSameSide && d < least) least = d, parent = old + i;
-      }
-      if (parent) inherit(n, parent->number, f);
-    }
+    if (!known[k] && reentrant && !step_.setup) inherit(n, body, former, formers, f);
   }
-  for (int i = 0; i < olds; ++i) {
-    if (old[i].taken) continue;
-    end_listed(old[i].number);
-  }
+  for (int i = 0; i < formers; ++i)
+    if (!former[i].taken) end_listed(former[i].number);
+  std::int32_t* link = head;
   for (int k = 0; k < count; ++k) {
     *link = number[k];
     link = &partner(number[k]).next;
   }
   *link = 0;
-  *head = first;
 }
 
 // Ends a contact that was not found again.
@@ -228,28 +224,33 @@ void ContactStages::end_listed(std::int32_t number) {
 }
 
 // A contact that appears with its counterpart, or in place of one, has the spring of the one it comes from.
-void ContactStages::inherit(std::int32_t number, std::int32_t parent, const WallContact& found) {
+void ContactStages::inherit(std::int32_t number, int body, const Former* former, int formers,
+                            const WallContact& found) {
+  const Former* parent = nullptr;
+  const double radius = step_.bodies->record(body).radius;
+  double least = 0.25 * radius * radius;
+  for (int i = 0; i < formers; ++i) {
+    const double d = (former[i].point - middle_of(found.result)).squaredNorm();
+    if (former[i].normal.dot(found.result.normal) >= kSameSide && d < least) least = d, parent = former + i;
+  }
+  if (parent == nullptr) return;
   ContactState old, state;
-  const ContactBlock& from = pool_.block(parent);
-  from.get(ContactPool::lane(parent), kStateField, kContactStateSize, &old);
+  const ContactBlock& from = pool_.block(parent->number);
+  const int from_lane = ContactPool::lane(parent->number);
+  from.get(from_lane, kStateField, kContactStateSize, &old);
   if (old.active == 0) return;
   ContactBlock& block = pool_.block(number);
   const int lane = ContactPool::lane(number);
-  if (step_.model != nullptr) {
-    const double* memory = pool_.memory(from, ContactPool::lane(parent));
-    return take_over_model(memory, block, lane);
-  }
-  const int b = block.b[lane];
-  const Vec3 middle = 0.5 * (found.result.point_a + found.result.point_b);
+  if (step_.model != nullptr) return take_over_model(pool_.memory(from, from_lane), block, lane);
+  const Vec3 middle = middle_of(found.result);
   const ContactCoefficients law = coefficients(block, lane);
   take_over(law,
             {-found.result.gap, found.result.normal, middle - load(partner(number).record.x),
-             middle - load(record(b).x)},
-            motion_of(partner(number).record), motion_of(record(b)), step_.dt, load(old.spring), &state);
+             middle - load(record(body).x)},
+            motion_of(partner(number).record), motion_of(record(body)), step_.dt, load(old.spring), &state);
   block.set(lane, kStateField, kContactStateSize, &state);
   if (step_.ledger && state.active != 0)
-    dissipated_.damping -= (block.field[kWeight][lane] < 0 ? -1 : 1) * share(-1, b) *
-                           stored_energy(law, state).tangential_spring;
+    dissipated_.damping -= sign(block, lane) * share(-1, body) * stored_energy(law, state).tangential_spring;
 }
 
 // A contact that takes another off is none to be counted, and of a polygon its points are.
