@@ -117,8 +117,8 @@ void ContactStages::ask_model(ContactBlock& block, int lane, const ContactGeomet
     own.kind = step_.model->kind();
   }
   const ModelMemory old = own;
-  ContactState before, state{};
-  block.get(lane, kStateField, kContactStateSize, &before);
+  ContactState before{}, state{};
+  if (step_.ledger) block.get(lane, kStateField, kContactStateSize, &before);
 
   const bool known = own.curvature_a != 0 || own.curvature_b != 0;
   if (!known) {
