@@ -32,6 +32,13 @@ struct Cell {
   std::vector<Vec4> z;    // (z w, 0) of a patch with a pole, one degree less towards it
 };
 
+// W(v, v) >= most (v . along)^2 + least (v . other)^2 for every tangent v of a cell, `along` and `other` at
+// right angles to each other and to the cell's axis: for bodies that bend much more one way than the other.
+struct Stretch {
+  Vec3 along = Vec3::Zero();  // unit
+  double most = 0, least = 0;
+};
+
 struct CellBounds {
   bool regular = false;                   // the surface has a normal everywhere in the cell
   bool convex = false;                    // all its normal curvatures are positive there
@@ -39,6 +46,7 @@ struct CellBounds {
   double cone = 0;                        // ... this angle of it, rad
   double min_radius = 0, max_radius = 0;  // of curvature; 0 and infinity where nothing is proven
   double least_curvature = 0;  // no normal curvature is below this; minus infinity where nothing is proven
+  Stretch stretch;             // 0 where nothing is proven
   double rate = 0;             // bound of |dW/dn|, infinite where none is proven
   double speed_u = 0, speed_v = 0;  // least length of surface crossed per unit of the patch's u and v, square
                                     // to the other parameter line

@@ -13,6 +13,7 @@
 
 #include "body/direction_atlas.h"
 #include "body/flat_faces.h"
+#include "body/inner_map.h"
 #include "body/normal_map.h"
 #include "body/revolution.h"
 #include "body/rolling.h"
@@ -122,6 +123,7 @@ struct Shape {
   JointDistance joints;                    // to kinked joints: where the patch curvatures hold for the body
   NormalMap normal_map;                    // local bounds, for bodies with flats or dents
   DirectionAtlas atlas;
+  InnerMap inner_map;     // balls inside the body over directions
   Revolution revolution;  // about an axis, if the body is one
   FlatFeatures flats;     // faces, creases and ruled lines; empty for round bodies
 

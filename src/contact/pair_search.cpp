@@ -3,6 +3,7 @@
 
 #include <cmath>
 
+#include "contact/deep_search.h"
 #include "contact/direction_search.h"
 #include "contact/joint_newton.h"
 #include "contact/pair_frame.h"
@@ -242,6 +243,11 @@ class Ladder {
   // estimate of points and normal than the polytope's own.
   ContactResult fallback(const PairFrame& pair, const JointSolution* known, const Vec3& seed,
                          double tolerance, int spent) {
+    JointSolution deep;
+    deep.iterations = 0;
+    if (known) deep = *known;
+    if ((!known || is_too_deep(*known)) && search_deep(pair, tolerance, &deep) && deep.converged)
+      return finish(pair, deep, deep.normal, Rung::fallback, spent + deep.iterations);
     PolytopeResult hull = solve_polytope(pair, known ? known->normal : seed, tolerance, settings_.reach);
     spent += hull.iterations;
     JointSolution joint;

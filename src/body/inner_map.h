@@ -1,0 +1,51 @@
+// The inner map: over directions, balls that lie inside a body as far as those directions can tell. With two
+// of them, one a body, whole ranges of directions are known to overlap by more than some depth without a
+// support evaluated (contact/deep_search.h).
+#pragma once
+
+#include <array>
+#include <vector>
+
+#include "nurbs/types.h"
+
+namespace nurbs {
+
+struct Shape;
+struct SurfaceBounds;
+
+// rad: within these angles of a node's normal its radii hold, and the eigenvalues of its stretch.
+constexpr std::array<double, 4> kInnerCaps = {0.14, 0.18, 0.27, 0.45};
+constexpr std::array<double, 3> kStretchCaps = {0.1, 0.14, 0.18};
+
+// At each node of the direction atlas. Let W be the inverse Weingarten map (W = dx/dn) at a support point.
+// Where every W that belongs to a direction within kInnerCaps[k] of `normal` has
+//     W(v, v) >= radius[k]   for unit tangents v,
+// h'' + h >= radius[k] along great circles there (in the sense of measures: where a flat or a groove adds to
+// it, it adds what is positive), so that from `normal` on
+//     h(d) >= d.point + radius[k] (1 - d.normal)   for unit d within kInnerCaps[k] of it.
+// Hypotheses: the body is convex (not Shape::dented()), its joints meet, `point` is the support there.
+struct InnerNode {
+  Vec3 point = Vec3::Zero();   // shape frame, scale 1
+  Vec3 normal = Vec3::Zero();  // unit
+  std::array<float, 4> radius = {0, 0, 0, 0};
+};
+static_assert(sizeof(InnerNode) == 64, "a line of cache");
+
+// The same for bodies that bend much more one way than the other: within kStretchCaps[k] of the node's normal
+//     W(v, v) >= least[k] + most[k] (along . v)^2.
+struct InnerStretch {
+  std::array<float, 3> along = {0, 0, 0};  // unit, square to the normal
+  std::array<float, 3> least = {0, 0, 0}, most = {0, 0, 0};
+};
+
+struct InnerMap {
+  std::vector<InnerNode> nodes;  // none: the hypotheses do not hold
+  std::vector<InnerStretch> stretches;
+};
+
+// Of a shape whose atlas is done. From the leaves of `bounds`, whose normals and curvatures are proven,
+// halved further; the normals between the sides of an opening joint have radius 0, as a crease has. Some ms,
+// 170 kB.
+InnerMap make_inner_map(const Shape& shape, const SurfaceBounds& bounds);
+
+}  // namespace nurbs

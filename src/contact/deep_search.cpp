@@ -1,0 +1,280 @@
+// Branch and bound over a cube map of directions; see deep_search.h.
+#include "contact/deep_search.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "body/cube_map.h"
+#include "contact/direction_search.h"
+#include "nurbs/lanes.h"
+
+namespace nurbs {
+namespace {
+
+constexpr int kFirstDepth = 2;   // 96 cells
+constexpr int kNewtonDepth = 5;  // at which a cell that stays is looked into, and every other one below
+constexpr int kDeepest = 9;
+constexpr int kMostCells = 800;
+constexpr int kMostNewtons = 12;
+constexpr int kMostCaps = 8;
+// A cap grows over the stretches' and the radii's, which are the same but for the first.
+constexpr int kStretches = static_cast<int>(kStretchCaps.size()),
+              kCapSteps = static_cast<int>(kInnerCaps.size()) + 1;
+static_assert(kStretchCaps[1] == kInnerCaps[0] && kStretchCaps[2] == kInnerCaps[1]);
+constexpr double kLeastCap = 0.02;       // rad: about the best minimum; less would leave thousands of cells
+constexpr double kFromThreshold = 0.25;  // of the tolerance, between the least p found and what is proven
+constexpr double kSlack = 0.1;           // of a stretch, given away for the tilt of its direction
+constexpr double kCapRoundoff = 1e-7;    // rad: angles are arc cosines
+
+// What the inner maps' caps have to reach by cells of a depth: half a cell's diagonal, and half of one of the
+// atlas's.
+constexpr int cap_of_depth(int depth) {
+  return depth >= 5 ? 0 : 5 - depth;
+}
+constexpr double reach_of_depth(int depth) {
+  return M_SQRT2 / (1 << depth) + M_SQRT2 / kAtlasCells;
+}
+static_assert(reach_of_depth(2) < kInnerCaps[3] && reach_of_depth(3) < kInnerCaps[2] &&
+              reach_of_depth(4) < kInnerCaps[1] && reach_of_depth(5) < kInnerCaps[0]);
+
+struct Cap {
+  Vec3 d;
+  double cosine;
+};
+
+struct DirectionCell {
+  short face, depth, i, j;
+};
+
+// The four corners and the middle of a cell, as D = +-axis + a * next axis + b * the one after.
+struct Corners {
+  int k, k1, k2;
+  double sign, a, b;
+  Lane4 at_a, at_b, length2;
+
+  explicit Corners(const DirectionCell& c)
+      : k(c.face / 2), k1(k == 2 ? 0 : k + 1), k2(k == 0 ? 2 : k - 1), sign(c.face % 2 ? -1 : 1) {
+    const double half = 1.0 / (1 << c.depth);
+    a = (2 * c.i + 1) * half - 1;
+    b = (2 * c.j + 1) * half - 1;
+    at_a = Lane4{a - half, a - half, a + half, a + half};
+    at_b = Lane4{b - half, b + half, b - half, b + half};
+    length2 = 1 + at_a * at_a + at_b * at_b;
+  }
+  Vec3 middle() const {
+    Vec3 d;
+    d[k] = sign;
+    d[k1] = a;
+    d[k2] = b;
+    return d;
+  }
+  // Whether D . g >= level |D| at all four, level >= 0.
+  bool above(const Vec3& g, double level) const {
+    const Lane4 height = sign * g[k] + g[k1] * at_a + g[k2] * at_b,
+                left = height * height - level * level * length2;
+    const auto low = [](const Lane4& x) { return std::min(std::min(x[0], x[1]), std::min(x[2], x[3])); };
+    return low(height) >= 0 && low(left) >= 0;
+  }
+};
+
+class DeepSearch {
+ public:
+  DeepSearch(const PairFrame& pair, double tolerance)
+      : pair_(pair),
+        tolerance_(tolerance),
+        noise_(8 * kRoundoff * pair.reach),
+        widest_(pair.scale_a * pair.a->patch_curvature.max_radius +
+                pair.scale_b * pair.b->patch_curvature.max_radius) {}
+
+  bool run(JointSolution* best) {
+    if (pair_.a->inner_map.nodes.empty() || pair_.b->inner_map.nodes.empty() || !(widest_ < kFarAway))
+      return false;
+    if (best->iterations > 0) consider(*best);
+    if (!first_cells() || !rest()) return false;
+    finish(best);
+    return true;
+  }
+
+ private:
+  const InnerNode& node_a(const Vec3& d) const { return pair_.a->inner_map.nodes[pair_.a->atlas.nearest(d)]; }
+  const InnerNode& node_b(const Vec3& on_b) const {
+    return pair_.b->inner_map.nodes[pair_.b->atlas.nearest(on_b)];
+  }
+
+  // Whether all directions of a cell have p >= threshold_.
+  bool excluded(const DirectionCell& cell, const Corners& corners) const {
+    for (int k = 0; k < caps_; ++k)
+      if (corners.above(cap_[k].d, cap_[k].cosine)) return true;
+    const Vec3 middle = corners.middle();
+    const InnerNode &a = node_a(middle), &b = node_b(pair_.direction_on_b(middle));
+    const int k = cap_of_depth(cell.depth);
+    double ra = pair_.scale_a * a.radius[k], rb = pair_.scale_b * b.radius[k];
+    const double most = threshold_ / (ra + rb);
+    if (most < 1) {
+      ra *= most;
+      rb *= most;
+    }
+    const Vec3 g = pair_.scale_a * a.point - ra * a.normal -
+                   (pair_.offset + pair_.turn * (pair_.scale_b * b.point - rb * b.normal));
+    return corners.above(g, std::max(0.0, threshold_ - ra - rb) + noise_);
+  }
+
+  // Newton from the atlases' points nearest to a direction (of any length). False where the search can't go
+  // on.
+  bool look(const Vec3& d) {
+    if (++newtons_ > kMostNewtons) return false;
+    const Shape &a = *pair_.a, &b = *pair_.b;
+    const JointSolution s = solve_joint(pair_, a.atlas.where[a.atlas.nearest(d)],
+                                        b.atlas.where[b.atlas.nearest(pair_.direction_on_b(d))], tolerance_,
+                                        kFarAway, kPolishIterations);
+    iterations_ += s.iterations;
+    return !(s.stationary || s.converged) || consider(s);
+  }
+
+  // Takes a local minimum: lowers the threshold to it if it is the least, makes a cap. False where it is the
+  // least and has none.
+  bool consider(const JointSolution& s) {
+    const double least = -s.bracket.lower - kFromThreshold * tolerance_;
+    const bool lowest = least < threshold_;
+    if (!(least > tolerance_)) return closed_ = false;  // not deep
+    if (lowest) {
+      threshold_ = least;
+      best_ = s;
+    }
+    const Vec3& d = s.bracket.direction;
+    for (int k = 0; k < caps_; ++k)
+      if (d.dot(cap_[k].d) > 1 - 0.5 * kLeastCap * kLeastCap) return true;
+    const double angle = cap_about(s);
+    if (lowest) closed_ = angle >= kLeastCap;
+    if (angle < kLeastCap) return !lowest;
+    if (caps_ == kMostCaps) return false;
+    cap_[caps_++] = {d, std::cos(angle)};
+    return true;
+  }
+
+  // How far from a stationary direction p is proven to be at least the threshold, rad.
+  double cap_about(const JointSolution& s) const {
+    const Vec3& d = s.bracket.direction;
+    const Vec3 g = s.jet_a.at(JetLanes::kS) - s.jet_b.at(JetLanes::kS), on_b = pair_.direction_on_b(d);
+    const int a = pair_.a->atlas.nearest(d), b = pair_.b->atlas.nearest(on_b);
+    const InnerNode &na = pair_.a->inner_map.nodes[a], &nb = pair_.b->inner_map.nodes[b];
+    const double off =
+        std::acos(std::min(1.0, std::min(d.dot(na.normal), on_b.dot(nb.normal)))) + kCapRoundoff;
+    double y = d.dot(g),
+           slope = -((g - y * d).norm() + widest_ * (std::sqrt(s.bracket.angle2) + kPoleNormal));
+    double proven = 0;
+    for (int k = 0; k < kCapSteps; ++k) {
+      const bool by_radius = k >= kStretches;
+      const double to = (by_radius ? kInnerCaps[k - 1] : kStretchCaps[k]) - off, step = to - proven;
+      if (!(step > 0)) continue;
+      double m = by_radius
+                     ? 0
+                     : stretched(d, to, k, pair_.a->inner_map.stretches[a], pair_.b->inner_map.stretches[b]);
+      const int r = std::max(0, k - 1);
+      m = std::max(m, pair_.scale_a * na.radius[r] + pair_.scale_b * nb.radius[r]);
+      // y'' + y = m. Falling, it has its least value where it turns; rising at first, at an end.
+      const double above = y - m;
+      const double end = m + above * std::cos(step) + slope * std::sin(step);
+      const double least = slope < 0 ? m - std::hypot(above, slope) : std::min(y, end);
+      if (!((slope >= 0 || above < 0) && least >= threshold_ + noise_)) break;
+      slope = slope * std::cos(step) - above * std::sin(step);
+      y = end;
+      proven = to;
+      if (slope < 0) break;
+    }
+    return proven;
+  }
+
+  // Least eigenvalue of W_A + W_B within `angle` of d. For a unit v square to a direction there, v = cos e u
+  // + sin e d with u square to d and |e| <= angle, so |f . v| >= cos(angle) |f . u| - sin(angle) |f . d|.
+  double stretched(const Vec3& d, double angle, int k, const InnerStretch& a, const InnerStretch& b) const {
+    const Vec3 fa(a.along[0], a.along[1], a.along[2]);
+    const Vec3 fb = pair_.turn * Vec3(b.along[0], b.along[1], b.along[2]);
+    const double c2 = std::cos(angle) * std::cos(angle), s2 = 1 - c2;
+    const double most_a = pair_.scale_a * a.most[k], most_b = pair_.scale_b * b.most[k];
+    const double ta = d.dot(fa), tb = d.dot(fb);
+    const double lost = (1 / kSlack - 1) * s2 * (most_a * ta * ta + most_b * tb * tb);
+    const double wa = (1 - kSlack) * c2 * most_a, wb = (1 - kSlack) * c2 * most_b;
+    const double half = 0.5 * (wa * (fa.squaredNorm() - ta * ta) + wb * (fb.squaredNorm() - tb * tb));
+    const double across = d.dot(fa.cross(fb)), det = wa * wb * across * across;
+    const double least = half - std::sqrt(std::max(0.0, half * half - det));
+    return pair_.scale_a * a.least[k] + pair_.scale_b * b.least[k] + least - lost;
+  }
+
+  // The coarse cells; the lowest of those that stay is looked into first.
+  bool first_cells() {
+    constexpr int n = 1 << kFirstDepth;
+    DirectionGuess lowest{Vec3::Zero(), threshold_};
+    for (short face = 0; face < 6; ++face)
+      for (short i = 0; i < n; ++i)
+        for (short j = 0; j < n; ++j) {
+          const DirectionCell cell{face, kFirstDepth, i, j};
+          const Corners corners(cell);
+          if (threshold_ < kFarAway && excluded(cell, corners)) continue;
+          cell_[count_++] = cell;
+          const Vec3 d = corners.middle().normalized();
+          const double p = atlas_overlap(pair_, d);
+          if (p < lowest.p) lowest = {d, p};
+        }
+    cells_ = 6 * n * n;
+    if (lowest.d.squaredNorm() > 0) look(refine_guess(pair_, lowest).d);
+    return closed_;
+  }
+
+  bool rest() {
+    while (count_ > 0) {
+      if (++cells_ > kMostCells) return false;
+      const DirectionCell cell = cell_[--count_];
+      const Corners corners(cell);
+      if (excluded(cell, corners)) continue;
+      if (cell.depth >= kNewtonDepth && (cell.depth - kNewtonDepth) % 2 == 0 && far_from_caps(corners)) {
+        const int caps = caps_;
+        const double threshold = threshold_;
+        if (!look(corners.middle())) return false;
+        if ((caps_ > caps || threshold_ < threshold) && excluded(cell, corners)) continue;
+      }
+      if (cell.depth == kDeepest) return false;
+      const short depth = cell.depth + 1, i = 2 * cell.i, j = 2 * cell.j, i1 = i + 1, j1 = j + 1;
+      cell_[count_++] = {cell.face, depth, i, j};
+      cell_[count_++] = {cell.face, depth, i, j1};
+      cell_[count_++] = {cell.face, depth, i1, j};
+      cell_[count_++] = {cell.face, depth, i1, j1};
+    }
+    return true;
+  }
+
+  // Twice as far from every minimum as its cap reaches.
+  bool far_from_caps(const Corners& corners) const {
+    const Vec3 d = corners.middle().normalized();
+    for (int k = 0; k < caps_; ++k)
+      if (1 - d.dot(cap_[k].d) < 4 * (1 - cap_[k].cosine)) return false;
+    return true;
+  }
+
+  void finish(JointSolution* best) const {
+    const int spent = best->iterations + iterations_;
+    *best = best_;
+    best->iterations = spent;
+    best->bracket.upper = -threshold_ + noise_;
+    best->converged = best->bracket.width() <= tolerance_;
+    best->gap = std::clamp(best->gap, best->bracket.lower, best->bracket.upper);
+  }
+
+  const PairFrame& pair_;
+  const double tolerance_, noise_;
+  const double widest_;  // sum of the bodies' largest curvature radii
+  double threshold_ = kFarAway;
+  bool closed_ = false;  // the least minimum found has a cap
+  JointSolution best_;
+  int caps_ = 0, count_ = 0, cells_ = 0, newtons_ = 0, iterations_ = 0;
+  Cap cap_[kMostCaps];
+  DirectionCell cell_[6 * (1 << kFirstDepth) * (1 << kFirstDepth) + 4 * kDeepest];
+};
+
+}  // namespace
+
+bool search_deep(const PairFrame& pair, double tolerance, JointSolution* best) {
+  return DeepSearch(pair, tolerance).run(best);
+}
+
+}  // namespace nurbs

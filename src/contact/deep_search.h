@@ -1,0 +1,27 @@
+// The global minimum of p(d) where bodies overlap deeply: the local minima that joint Newton finds, and the
+// proof that no other direction overlaps by less, from the inner maps (body/inner_map.h) alone.
+#pragma once
+
+#include "contact/joint_newton.h"
+
+namespace nurbs {
+
+// Makes *best, a stationary pair or nothing (iterations 0), the global minimum of p(d) = h_A(d) + h_B(-d) -
+// d . offset, with a closed bracket; false, and *best as it was, where the proof does not succeed: bodies
+// with flats, dents or joints that gape, minima that are no strict ones or lie in creases. 3 to 10 us.
+//
+// Proof, for a depth T a quarter of `tolerance` below the least p found. The sphere of directions is covered
+// by
+//   * cells of a cube map, halved until every direction in them has p(d) >= T. By the inner maps' nodes
+//     nearest to the cell's middle (x_K, n_K, and radii r_K that hold as far as the cell's corners)
+//         p(d) >= d . g + r_A + r_B,   g = (x_A - r_A n_A) - (x_B - r_B n_B),
+//     and along an edge of the cell D . g - (T - r_A - r_B) |D|, D = d times any factor, is concave where
+//     radii are cut to T in sum: what holds at the four corners holds in the cell.
+//   * caps about local minima. If W_A + W_B >= m (as forms) for all directions within t of d, then by p'' + p
+//     >= m along great circles p there is at least the solution of y'' + y = m with y(0) = d . (a - b), a and
+//     b any points of the bodies, and y'(0) = -s, s a bound of p's slope at d: |a - b across d| and the
+//     largest curvature radii times the angles between d and the normals at a and b. m comes from the nodes
+//     nearest to d, in steps over their caps.
+bool search_deep(const PairFrame& pair, double tolerance, JointSolution* best);
+
+}  // namespace nurbs

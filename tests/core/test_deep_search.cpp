@@ -1,0 +1,172 @@
+// Proofs for deep overlaps: the inner map against dense evaluation, the search over directions against
+// supports along thousands of them and against the polytope.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
+#include "body/local_form.h"
+#include "contact/deep_search.h"
+#include "contact/pair_search.h"
+#include "contact/polytope.h"
+#include "shapes/revolved.h"
+#include "support/bodies.h"
+#include "support/pairs.h"
+
+namespace nurbs {
+namespace {
+
+using namespace test;
+
+ShapePointer slender() {
+  static const ShapePointer s = make_shape("slender", exact_ellipsoid(Vec3(1, 0.3, 0.2)));
+  return s;
+}
+// Eccentricity 20, curvature that changes a thousandfold.
+ShapePointer needle() {
+  static const ShapePointer s = make_shape("needle", exact_ellipsoid(Vec3(1, 0.1, 0.05)));
+  return s;
+}
+
+std::vector<ShapePointer> bodies() {
+  std::vector<ShapePointer> all = all_shapes();
+  for (const ShapePointer& s : {slender(), needle()}) all.push_back(s);
+  return all;
+}
+
+// A unit vector within `angle` of n, its square even.
+Vec3 near(const Vec3& n, double angle, Random& random) {
+  const Vec3 t = n.cross(random.direction()).normalized();
+  const double turn = angle * std::sqrt(random.uniform(0, 1));
+  return std::cos(turn) * n + std::sin(turn) * t;
+}
+
+TEST(InnerMap, balls_of_every_node_bound_the_supports_around_it) {
+  Random random(71);
+  for (const ShapePointer& shape : bodies()) {
+    if (shape->inner_map.nodes.empty()) continue;
+    double closest = 1e300;
+    for (int k = 0; k < 4000; ++k) {
+      const InnerNode& node = shape->inner_map.nodes[random.below(shape->atlas.nodes())];
+      const int cap = random.below(kInnerCaps.size());
+      const Vec3 d = near(node.normal, kInnerCaps[cap], random);
+      const double ball = d.dot(node.point) + node.radius[cap] * 0.5 * (d - node.normal).squaredNorm();
+      const double over = find_hull_support(*shape, d).h - ball;
+      ASSERT_GE(over, -1e-13) << shape->name << " cap " << cap;
+      if (node.radius[cap] > 0) closest = std::min(closest, over);
+    }
+    if (!shape->smooth) continue;
+    EXPECT_LT(closest, 1e-3) << shape->name << ": so loose that the test shows nothing";
+  }
+}
+
+TEST(InnerMap, stretches_of_every_node_bound_the_curvature_around_it) {
+  Random random(72);
+  for (const ShapePointer& shape : bodies()) {
+    if (shape->inner_map.nodes.empty()) continue;
+    double closest = 1e300;
+    long pairs = 0, wide = 0;
+    for (int k = 0; k < 3000; ++k) {
+      const int patch = random.below(static_cast<int>(shape->patches.size()));
+      const LocalForm form = local_form(shape->patches[patch], random.uniform(0, 1), random.uniform(0, 1));
+      if (!(form.k_min > 0)) continue;
+      // W of a unit tangent v that is J q: |J^-T ...|, by W = J II^-1 J'.
+      const Vec3 v = form.normal.cross(random.direction()).normalized();
+      const Vec2 along(v.dot(form.su), v.dot(form.sv));
+      const double w = along.dot(form.second.inverse() * along);
+      for (int i = 0; i < shape->atlas.nodes(); ++i) {
+        const InnerNode& node = shape->inner_map.nodes[i];
+        const double angle = angle_between(node.normal, form.normal);
+        const InnerStretch& s = shape->inner_map.stretches[i];
+        const double f = s.along[0] * v[0] + s.along[1] * v[1] + s.along[2] * v[2];
+        for (std::size_t cap = 0; cap < kStretchCaps.size(); ++cap) {
+          if (angle > kStretchCaps[cap]) continue;
+          const double bound = s.least[cap] + s.most[cap] * f * f;
+          ASSERT_LE(bound, w * (1 + 1e-9)) << shape->name << " cap " << cap << " node " << i;
+          ++pairs;
+          wide += s.most[cap] > s.least[cap];
+          if (bound > 0) closest = std::min(closest, w / bound);
+        }
+        for (std::size_t cap = 0; cap < kInnerCaps.size(); ++cap) {
+          if (angle > kInnerCaps[cap]) continue;
+          ASSERT_LE(node.radius[cap], w * (1 + 1e-9)) << shape->name;
+        }
+      }
+    }
+    if (!shape->smooth) continue;
+    EXPECT_LT(closest, 1.6) << shape->name << ": so loose that the test shows nothing";
+    if (shape != slender()) continue;
+    EXPECT_GT(wide, pairs / 4);
+  }
+}
+
+TEST(InnerMap, promises_nothing_where_normals_jump) {
+  // Between the normals of a box's faces every support is an edge or a corner.
+  for (const InnerNode& node : cuboid()->inner_map.nodes)
+    for (const float radius : node.radius) EXPECT_EQ(radius, 0);
+}
+
+// Overlaps of any depth, among them bodies on nearly one centre, where opposite directions are as good.
+Pair deep_pair(const Shape& a, const Shape& b, Random& random) {
+  Pair pair{{&a, 1, Vec3::Zero(), random.turn()},
+            {&b, random.log_uniform(0.2, 2), Vec3::Zero(), random.turn()}};
+  const double size = std::min(a.bounding_radius, pair.b.scale * b.bounding_radius);
+  const double offset = random.below(3) ? random.uniform(0, 1) : random.log_uniform(1e-10, 0.1);
+  pair.b.x = offset * size * random.direction();
+  return pair;
+}
+
+TEST(DeepSearch, no_direction_overlaps_by_less_than_is_proven) {
+  Random random(73);
+  const ShapePointer shapes[] = {ellipsoid(), disc(), slender(), smooth_pebble(), polar(), needle()};
+  int proven = 0, tried = 0;
+  for (int k = 0; k < 600; ++k) {
+    const Pair p = deep_pair(*shapes[random.below(6)], *shapes[random.below(6)], random);
+    const PairFrame pair(p.a, p.b);
+    const double tolerance = 1e-9 * pair.size;
+    JointSolution s;
+    s.iterations = 0;
+    ++tried;
+    if (!search_deep(pair, tolerance, &s)) continue;
+    ++proven;
+    ASSERT_TRUE(s.converged);
+    EXPECT_LE(s.bracket.width(), tolerance);
+    const auto overlap = [&](const Vec3& d) { return overlap_along(p.a, p.b, pair.axes_a * d); };
+    const double least = -s.bracket.upper, noise = 1e-14 * pair.reach;
+    EXPECT_NEAR(overlap(s.normal), -s.gap, tolerance + noise);
+    for (int i = 0; i < 400; ++i) ASSERT_GE(overlap(random.direction()), least - noise) << k;
+    for (int i = 0; i < 100; ++i)
+      ASSERT_GE(overlap(near(s.normal, random.log_uniform(1e-6, 0.3), random)), least - noise) << k;
+    if (k % 4) continue;
+    const PolytopeResult hull = solve_polytope(pair, s.normal, tolerance, kFarAway);
+    EXPECT_LE(s.bracket.lower, hull.bracket.upper + noise) << k;
+    EXPECT_GE(s.bracket.upper, hull.bracket.lower - noise) << k;
+  }
+  EXPECT_GT(proven, tried / 2);
+}
+
+TEST(DeepSearch, a_local_minimum_is_not_taken_for_the_least) {
+  // Along the disc's rim the overlap has a local minimum; across it, a far lesser one.
+  Random random(74);
+  int found = 0;
+  for (int k = 0; k < 40; ++k) {
+    Pair p = deep_pair(*disc(), *ellipsoid(), random);
+    p.b.scale = 0.3;
+    p.b.x = p.a.q * Vec3(0.6, 0.1, 0.05);
+    const PairFrame pair(p.a, p.b);
+    const Vec3 rim = Vec3::UnitX(), on_b = pair.direction_on_b(rim);
+    JointSolution s = solve_joint(pair, find_hull_support(*pair.a, rim).where,
+                                  find_hull_support(*pair.b, on_b).where, 1e-9, kFarAway, 20);
+    if (!s.stationary || s.normal[0] < 0.5) continue;
+    const double before = -s.gap;
+    if (!search_deep(pair, 1e-9 * pair.size, &s)) continue;
+    ++found;
+    EXPECT_LT(-s.gap, 0.9 * before);
+    EXPECT_GT(std::abs(s.normal[2]), 0.8);
+  }
+  EXPECT_GT(found, 5);
+}
+
+}  // namespace
+}  // namespace nurbs
