@@ -37,9 +37,16 @@ constexpr double reach_of_depth(int depth) {
 static_assert(reach_of_depth(2) < kInnerCaps[3] && reach_of_depth(3) < kInnerCaps[2] &&
               reach_of_depth(4) < kInnerCaps[1] && reach_of_depth(5) < kInnerCaps[0]);
 
+constexpr double kKeptAngle = 0.75;  // of a cap, where a proof is to outlive this step ...
+constexpr double kKeptRise = 0.25;   // ... of p's rise over the cap, which cells lie above its least by
+
 struct Cap {
   Vec3 d;
   double cosine;
+};
+
+struct Grown {
+  double angle, rise;  // of p above the level at the rim
 };
 
 struct DirectionCell {
@@ -86,13 +93,27 @@ class DeepSearch {
         widest_(pair.scale_a * pair.a->patch_curvature.max_radius +
                 pair.scale_b * pair.b->patch_curvature.max_radius) {}
 
-  bool run(JointSolution* best) {
-    if (pair_.a->inner_map.nodes.empty() || pair_.b->inner_map.nodes.empty() || !(widest_ < kFarAway))
-      return false;
+  bool run(JointSolution* best, DeepProof* proof) {
+    keep_ = proof != nullptr;
+    if (!serves()) return false;
     if (best->iterations > 0) consider(*best);
     if (!first_cells() || !rest()) return false;
     finish(best);
+    if (keep_) fill(proof);
     return true;
+  }
+
+  bool still_deepest(const DeepProof& proof, JointSolution* s) {
+    if (!(proof.level > 0) || !serves()) return false;
+    const double least = -s->bracket.lower - kFromThreshold * tolerance_;
+    if (!(least > tolerance_ && least <= proof.level - moved(proof) - noise_)) return false;
+    threshold_ = least;
+    const Vec3 before(proof.direction[0], proof.direction[1], proof.direction[2]);
+    const double turned = angle_between(s->bracket.direction, before) + kCapRoundoff;
+    if (!(cap_about(*s).angle >= proof.angle + turned)) return false;
+    best_ = *s;
+    finish(s);
+    return s->converged;
   }
 
  private:
@@ -101,7 +122,32 @@ class DeepSearch {
     return pair_.b->inner_map.nodes[pair_.b->atlas.nearest(on_b)];
   }
 
-  // Whether all directions of a cell have p >= threshold_.
+  bool serves() const {
+    return !pair_.a->inner_map.nodes.empty() && !pair_.b->inner_map.nodes.empty() && widest_ < kFarAway;
+  }
+  // What cells, and caps about all minima but the least, are proven to lie above.
+  double level() const { return threshold_ + margin_; }
+
+  // By how much p may have changed, for any direction.
+  double moved(const DeepProof& proof) const {
+    const Quat q(pair_.turn);
+    const Quat then(proof.turn[0], proof.turn[1], proof.turn[2], proof.turn[3]);
+    const double apart = std::min((q.coeffs() - then.coeffs()).norm(), (q.coeffs() + then.coeffs()).norm());
+    const Vec3 offset(proof.offset[0], proof.offset[1], proof.offset[2]);
+    return (pair_.offset - offset).norm() + 2 * pair_.scale_b * pair_.b->bounding_radius * apart;
+  }
+
+  void fill(DeepProof* proof) const {
+    const Quat q(pair_.turn);
+    const Vec3& d = best_.bracket.direction;
+    *proof = {{d[0], d[1], d[2]},
+              kept_.angle,
+              margin_ > 0 ? level() : 0,
+              {pair_.offset[0], pair_.offset[1], pair_.offset[2]},
+              {q.w(), q.x(), q.y(), q.z()}};
+  }
+
+  // Whether all directions of a cell have p >= level().
   bool excluded(const DirectionCell& cell, const Corners& corners) const {
     for (int k = 0; k < caps_; ++k)
       if (corners.above(cap_[k].d, cap_[k].cosine)) return true;
@@ -109,14 +155,14 @@ class DeepSearch {
     const InnerNode &a = node_a(middle), &b = node_b(pair_.direction_on_b(middle));
     const int k = cap_of_depth(cell.depth);
     double ra = pair_.scale_a * a.radius[k], rb = pair_.scale_b * b.radius[k];
-    const double most = threshold_ / (ra + rb);
+    const double level = this->level(), most = level / (ra + rb);
     if (most < 1) {
       ra *= most;
       rb *= most;
     }
     const Vec3 g = pair_.scale_a * a.point - ra * a.normal -
                    (pair_.offset + pair_.turn * (pair_.scale_b * b.point - rb * b.normal));
-    return corners.above(g, std::max(0.0, threshold_ - ra - rb) + noise_);
+    return corners.above(g, std::max(0.0, level - ra - rb) + noise_);
   }
 
   // Newton from the atlases' points nearest to a direction (of any length). False where the search can't go
@@ -137,23 +183,46 @@ class DeepSearch {
     const double least = -s.bracket.lower - kFromThreshold * tolerance_;
     const bool lowest = least < threshold_;
     if (!(least > tolerance_)) return closed_ = false;  // not deep
+    const double rival = lowest ? threshold_ : least;
     if (lowest) {
       threshold_ = least;
       best_ = s;
     }
+    margin_ = std::min(margin_, rival - threshold_);
     const Vec3& d = s.bracket.direction;
     for (int k = 0; k < caps_; ++k)
       if (d.dot(cap_[k].d) > 1 - 0.5 * kLeastCap * kLeastCap) return true;
-    const double angle = cap_about(s);
-    if (lowest) closed_ = angle >= kLeastCap;
-    if (angle < kLeastCap) return !lowest;
+    Grown cap = cap_about(s);
+    if (lowest) {
+      closed_ = cap.angle >= kLeastCap;
+      best_cap_ = caps_;
+      kept_ = cap;
+      if (keep_ && kKeptAngle * cap.angle >= kLeastCap) {
+        margin_ = std::min(rival - threshold_, kKeptRise * cap.rise);
+        cap.angle *= kKeptAngle;
+        whole_ = kept_.angle;
+        kept_ = cap;
+      }
+    }
+    if (cap.angle < kLeastCap) return !lowest;
     if (caps_ == kMostCaps) return false;
-    cap_[caps_++] = {d, std::cos(angle)};
+    cap_[caps_++] = {d, std::cos(cap.angle)};
     return true;
   }
 
-  // How far from a stationary direction p is proven to be at least the threshold, rad.
-  double cap_about(const JointSolution& s) const {
+  // Goes on without a margin for the steps to come; false where there was none.
+  bool give_up_margin() {
+    if (!(margin_ > 0)) return false;
+    margin_ = 0;
+    cap_[best_cap_].cosine = std::cos(whole_);
+    return true;
+  }
+
+  // How far from a stationary direction p is proven to be at least what it has to be, the threshold about the
+  // least minimum.
+  Grown cap_about(const JointSolution& s) const {
+    const double level =
+        -s.bracket.lower - kFromThreshold * tolerance_ > threshold_ ? this->level() : threshold_;
     const Vec3& d = s.bracket.direction;
     const Vec3 g = s.jet_a.at(JetLanes::kS) - s.jet_b.at(JetLanes::kS), on_b = pair_.direction_on_b(d);
     const int a = pair_.a->atlas.nearest(d), b = pair_.b->atlas.nearest(on_b);
@@ -176,13 +245,13 @@ class DeepSearch {
       const double above = y - m;
       const double end = m + above * std::cos(step) + slope * std::sin(step);
       const double least = slope < 0 ? m - std::hypot(above, slope) : std::min(y, end);
-      if (!((slope >= 0 || above < 0) && least >= threshold_ + noise_)) break;
+      if (!((slope >= 0 || above < 0) && least >= level + noise_)) break;
       slope = slope * std::cos(step) - above * std::sin(step);
       y = end;
       proven = to;
       if (slope < 0) break;
     }
-    return proven;
+    return {proven, y - level};
   }
 
   // Least eigenvalue of W_A + W_B within `angle` of d. For a unit v square to a direction there, v = cos e u
@@ -233,7 +302,10 @@ class DeepSearch {
         if (!look(corners.middle())) return false;
         if ((caps_ > caps || threshold_ < threshold) && excluded(cell, corners)) continue;
       }
-      if (cell.depth == kDeepest) return false;
+      if (cell.depth == kDeepest) {
+        if (give_up_margin() && excluded(cell, corners)) continue;
+        return false;
+      }
       const short depth = cell.depth + 1, i = 2 * cell.i, j = 2 * cell.j, i1 = i + 1, j1 = j + 1;
       cell_[count_++] = {cell.face, depth, i, j};
       cell_[count_++] = {cell.face, depth, i, j1};
@@ -263,8 +335,12 @@ class DeepSearch {
   const PairFrame& pair_;
   const double tolerance_, noise_;
   const double widest_;  // sum of the bodies' largest curvature radii
-  double threshold_ = kFarAway;
-  bool closed_ = false;  // the least minimum found has a cap
+  double threshold_ = kFarAway, margin_ = 0;
+  bool keep_ = false;    // the proof is to outlive this step
+  bool closed_ = false;  // the least minimum found has a cap, this one
+  int best_cap_ = 0;
+  double whole_ = 0;  // its angle before it was cut for the steps to come
+  Grown kept_{0, 0};
   JointSolution best_;
   int caps_ = 0, count_ = 0, cells_ = 0, newtons_ = 0, iterations_ = 0;
   Cap cap_[kMostCaps];
@@ -273,8 +349,12 @@ class DeepSearch {
 
 }  // namespace
 
-bool search_deep(const PairFrame& pair, double tolerance, JointSolution* best) {
-  return DeepSearch(pair, tolerance).run(best);
+bool search_deep(const PairFrame& pair, double tolerance, JointSolution* best, DeepProof* proof) {
+  return DeepSearch(pair, tolerance).run(best, proof);
+}
+
+bool still_deepest(const PairFrame& pair, double tolerance, const DeepProof& proof, JointSolution* s) {
+  return DeepSearch(pair, tolerance).still_deepest(proof, s);
 }
 
 }  // namespace nurbs

@@ -22,6 +22,29 @@ namespace nurbs {
 //     b any points of the bodies, and y'(0) = -s, s a bound of p's slope at d: |a - b across d| and the
 //     largest curvature radii times the angles between d and the normals at a and b. m comes from the nodes
 //     nearest to d, in steps over their caps.
-bool search_deep(const PairFrame& pair, double tolerance, JointSolution* best);
+//
+// `proof`, if asked for, is filled for the steps to come: then caps and levels keep a margin, which costs
+// some more cells. False in proof->level where none is to be had: two minima as good as each other.
+struct DeepProof;
+bool search_deep(const PairFrame& pair, double tolerance, JointSolution* best, DeepProof* proof = nullptr);
+
+// What a deep pair remembers, in place of a local model, as plain doubles: at the pose given, p is at least
+// `level` for all directions further than the cap's angle from `direction`. B is seen from A, so that a pair
+// that turns as one uses nothing up.
+struct DeepProof {
+  double direction[3];  // unit, A's axes
+  double angle;         // rad
+  double level;         // length; not positive: no proof
+  double offset[3];     // of B's centre, A's axes
+  double turn[4];       // B's axes into A's, w x y z
+};
+constexpr double kDeepProof = -1;  // LocalModel::unique of a memory that holds one
+
+// Whether a stationary pair that Newton found is still the global minimum; its bracket is then closed. Since
+// the proof p has changed by at most D = |change of offset| + 2 R_B |change of turn| for every direction (see
+// proven_gap), so that with least the p found here, less a quarter of the tolerance, p >= level - D >= least
+// outside the old cap; and the cap about the new direction, for which p >= least is proven anew, must hold
+// the old one. 0.1 us.
+bool still_deepest(const PairFrame& pair, double tolerance, const DeepProof& proof, JointSolution* s);
 
 }  // namespace nurbs

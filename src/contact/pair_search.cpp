@@ -2,6 +2,7 @@
 #include "contact/pair_search.h"
 
 #include <cmath>
+#include <cstring>
 
 #include "contact/deep_search.h"
 #include "contact/direction_search.h"
@@ -107,7 +108,7 @@ class Ladder {
         return true;
       }
       if (!is_too_deep(s)) return false;
-      *r = fallback(pair, &s, s.normal, tolerance, s.iterations);
+      *r = deep(pair, tolerance, s);
       return true;
     }
     const double turned2_a = turned2(a_.q, memory_.proof.q_a), turned2_b = turned2(b_.q, memory_.proof.q_b);
@@ -211,6 +212,22 @@ class Ladder {
     if (!joint.converged) confirm(pair, tolerance, joint);
     ++joint.iterations;
     return joint;
+  }
+
+  // The minimum of the last step as long as its proof lasts; then that and another proof, if they can be had.
+  ContactResult deep(const PairFrame& pair, double tolerance, JointSolution& s) {
+    static_assert(sizeof(DeepProof) <= 28 * sizeof(double), "in the place of the model's halves");
+    DeepProof proof;
+    std::memcpy(&proof, &memory_.model, sizeof proof);
+    const bool lasts = memory_.model.unique == kDeepProof && still_deepest(pair, tolerance, proof, &s);
+    if (!lasts && !(search_deep(pair, tolerance, &s, &proof) && s.converged))
+      return fallback(pair, &s, s.normal, tolerance, s.iterations);
+    const ContactResult r = finish(pair, s, s.normal, lasts ? Rung::warm : Rung::fallback, s.iterations);
+    if (r.status == Status::converged && proof.level > 0) {
+      std::memcpy(static_cast<void*>(&memory_.model), &proof, sizeof proof);
+      memory_.model.unique = kDeepProof;
+    }
+    return r;
   }
 
   // The line of centres leads to most contacts, and the certificate says when it did not: then the basins of

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 
+#include "contact/deep_search.h"
 #include "laws/linear_law.h"
 #include "reference/cso.h"
 #include "scene/contact_results.h"
@@ -404,7 +405,10 @@ void ContactStages::solve_lane(ContactBlock& block, int lane, Results& results) 
   PairMemory memory;
   memory.proof = *block.proof[lane];
   block.get(lane, kLocalModelSize, 10, &memory.on_a);
-  drop_model(&memory.model);
+  if (block.field[kUnique][lane] == kDeepProof)
+    block.get(lane, 0, kLocalModelSize, &memory.model);
+  else
+    drop_model(&memory.model);
   const ContactResult r = search(a, b, memory);
   count(r, a, b);
   results.set(lane, r, offset(a, b));
@@ -413,7 +417,7 @@ void ContactStages::solve_lane(ContactBlock& block, int lane, Results& results) 
   const std::int32_t contact = block.proof[lane]->contact;
   *block.proof[lane] = memory.proof;
   block.proof[lane]->contact = contact;
-  if (memory.model.unique > 0)
+  if (memory.model.unique > 0 || memory.model.unique == kDeepProof)
     block.set(lane, 0, kLocalModelSize, &memory.model);
   else
     block.field[kUnique][lane] = memory.model.unique;

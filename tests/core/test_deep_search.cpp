@@ -168,5 +168,45 @@ TEST(DeepSearch, a_local_minimum_is_not_taken_for_the_least) {
   EXPECT_GT(found, 5);
 }
 
+// Follows a pair with and without memory; how many steps were answered by a proof of an earlier one.
+int follow(Pair pair, double speed, int steps, Random& random) {
+  const double size =
+      std::min(pair.a.scale * pair.a.shape->bounding_radius, pair.b.scale * pair.b.shape->bounding_radius);
+  const Vec3 way = speed * size * random.direction(), axis = random.direction(), other = random.direction();
+  const double common = random.uniform(0, 0.1);  // rad a step, of both: uses up nothing
+  double memory[kPairMemorySize] = {0};
+  int warm = 0;
+  for (int step = 0; step < steps; ++step) {
+    const Quat turn(Eigen::AngleAxisd(common, other));
+    pair.a.q = (turn * pair.a.q).normalized();
+    pair.b.q = (turn * Quat(Eigen::AngleAxisd(speed, axis)) * pair.b.q).normalized();
+    pair.b.x = turn * (pair.b.x + way);
+    double none[kPairMemorySize] = {0};
+    const ContactResult r = find_contact(pair.a, pair.b, ContactSettings(), memory),
+                        cold = find_contact(pair.a, pair.b, ContactSettings(), none);
+    EXPECT_EQ(r.status, Status::converged);
+    EXPECT_NEAR(r.gap, cold.gap, 2e-9 * size) << "step " << step << " rung " << static_cast<int>(r.rung);
+    EXPECT_LE(r.lower, cold.upper + 1e-14);
+    EXPECT_GE(r.upper, cold.lower - 1e-14);
+    warm += r.rung == Rung::warm;
+  }
+  return warm;
+}
+
+TEST(DeepProof, outlives_steps_and_never_the_minimum) {
+  Random random(75);
+  const ShapePointer shapes[] = {ellipsoid(), disc(), slender(), smooth_pebble(), polar()};
+  for (const double speed : {1e-5, 1e-3, 0.03}) {  // the last switches minima again and again
+    int warm = 0, steps = 0;
+    for (int k = 0; k < 30; ++k) {
+      Pair p = deep_pair(*shapes[random.below(5)], *shapes[random.below(5)], random);
+      p.b.x *= 0.5;
+      warm += follow(p, speed, 40, random);
+      steps += 40;
+    }
+    EXPECT_GT(warm, speed < 1e-4 ? steps / 2 : speed < 0.01 ? steps / 4 : -1);
+  }
+}
+
 }  // namespace
 }  // namespace nurbs
