@@ -14,6 +14,8 @@ namespace {
 constexpr int kFirstDepth = 2;   // 96 cells
 constexpr int kNewtonDepth = 5;  // at which a cell that stays is looked into, and every other one below
 constexpr int kDeepest = 9;
+constexpr int kSupportDepth = 6;  // from which supports are evaluated
+constexpr int kMostSupports = 60;
 constexpr int kMostCells = 800;
 constexpr int kMostNewtons = 12;
 constexpr int kMostCaps = 8;
@@ -147,22 +149,41 @@ class DeepSearch {
               {q.w(), q.x(), q.y(), q.z()}};
   }
 
+  // Of two nodes, cut to the level in sum, and what they leave of it.
+  struct Radii {
+    double a, b, level;
+  };
+  Radii radii(const InnerNode& a, const InnerNode& b, int cap) const {
+    const double ra = pair_.scale_a * a.radius[cap], rb = pair_.scale_b * b.radius[cap],
+                 level = this->level();
+    const double share = std::min(1.0, level / (ra + rb));
+    return {share * ra, share * rb, std::max(0.0, level - share * (ra + rb))};
+  }
+
   // Whether all directions of a cell have p >= level().
   bool excluded(const DirectionCell& cell, const Corners& corners) const {
     for (int k = 0; k < caps_; ++k)
       if (corners.above(cap_[k].d, cap_[k].cosine)) return true;
     const Vec3 middle = corners.middle();
     const InnerNode &a = node_a(middle), &b = node_b(pair_.direction_on_b(middle));
-    const int k = cap_of_depth(cell.depth);
-    double ra = pair_.scale_a * a.radius[k], rb = pair_.scale_b * b.radius[k];
-    const double level = this->level(), most = level / (ra + rb);
-    if (most < 1) {
-      ra *= most;
-      rb *= most;
-    }
-    const Vec3 g = pair_.scale_a * a.point - ra * a.normal -
-                   (pair_.offset + pair_.turn * (pair_.scale_b * b.point - rb * b.normal));
-    return corners.above(g, std::max(0.0, level - ra - rb) + noise_);
+    const Radii r = radii(a, b, cap_of_depth(cell.depth));
+    const Vec3 g = pair_.scale_a * a.point - r.a * a.normal -
+                   (pair_.offset + pair_.turn * (pair_.scale_b * b.point - r.b * b.normal));
+    return corners.above(g, r.level + noise_);
+  }
+
+  // The same from the supports along the cell's middle, for cells so small that the nodes are far off.
+  bool excluded_by_supports(const DirectionCell& cell, const Corners& corners) {
+    if (++supports_ > kMostSupports) return false;
+    const Vec3 middle = corners.middle(), d = middle.normalized(), on_b = pair_.direction_on_b(d);
+    const Radii r = radii(node_a(d), node_b(on_b), cap_of_depth(cell.depth));
+    const Support a = find_hull_support(*pair_.a, d, &best_.base_a,
+                                        kSupportShare * tolerance_ / pair_.scale_a),
+                  b = find_hull_support(*pair_.b, on_b, &best_.base_b,
+                                        kSupportShare * tolerance_ / pair_.scale_b);
+    const Vec3 g =
+        pair_.place_a(a.point) - r.a * a.normal - pair_.place_b(b.point) + r.b * (pair_.turn * b.normal);
+    return corners.above(g, r.level + noise_);
   }
 
   // Newton from the atlases' points nearest to a direction (of any length). False where the search can't go
@@ -302,6 +323,7 @@ class DeepSearch {
         if (!look(corners.middle())) return false;
         if ((caps_ > caps || threshold_ < threshold) && excluded(cell, corners)) continue;
       }
+      if (cell.depth >= kSupportDepth && excluded_by_supports(cell, corners)) continue;
       if (cell.depth == kDeepest) {
         if (give_up_margin() && excluded(cell, corners)) continue;
         return false;
@@ -342,7 +364,7 @@ class DeepSearch {
   double whole_ = 0;  // its angle before it was cut for the steps to come
   Grown kept_{0, 0};
   JointSolution best_;
-  int caps_ = 0, count_ = 0, cells_ = 0, newtons_ = 0, iterations_ = 0;
+  int caps_ = 0, count_ = 0, cells_ = 0, newtons_ = 0, supports_ = 0, iterations_ = 0;
   Cap cap_[kMostCaps];
   DirectionCell cell_[6 * (1 << kFirstDepth) * (1 << kFirstDepth) + 4 * kDeepest];
 };
