@@ -3,10 +3,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 
 #include "body/cube_map.h"
 #include "contact/direction_search.h"
-#include "nurbs/lanes.h"
+#include "nurbs/wide.h"
 
 namespace nurbs {
 namespace {
@@ -51,38 +52,48 @@ struct Grown {
   double angle, rise;  // of p above the level at the rim
 };
 
+// One number: written as four and read as one, the stack of cells would wait for itself.
 struct DirectionCell {
-  short face, depth, i, j;
+  std::uint32_t code;
+  DirectionCell() = default;
+  DirectionCell(int face, int depth, int i, int j)
+      : code(static_cast<std::uint32_t>(face << 28 | depth << 24 | i << 12 | j)) {}
+  int face() const { return code >> 28; }
+  int depth() const { return code >> 24 & 15; }
+  int i() const { return code >> 12 & 4095; }
+  int j() const { return code & 4095; }
 };
 
 // The four corners and the middle of a cell, as D = +-axis + a * next axis + b * the one after.
 struct Corners {
-  int k, k1, k2;
+  int k;
   double sign, a, b;
   Lane4 at_a, at_b, length2;
 
-  explicit Corners(const DirectionCell& c)
-      : k(c.face / 2), k1(k == 2 ? 0 : k + 1), k2(k == 0 ? 2 : k - 1), sign(c.face % 2 ? -1 : 1) {
-    const double half = 1.0 / (1 << c.depth);
-    a = (2 * c.i + 1) * half - 1;
-    b = (2 * c.j + 1) * half - 1;
+  explicit Corners(const DirectionCell& c) : k(c.face() / 2), sign(c.face() % 2 ? -1 : 1) {
+    const double half = 1.0 / (1 << c.depth());
+    a = (2 * c.i() + 1) * half - 1;
+    b = (2 * c.j() + 1) * half - 1;
     at_a = Lane4{a - half, a - half, a + half, a + half};
     at_b = Lane4{b - half, b + half, b - half, b + half};
     length2 = 1 + at_a * at_a + at_b * at_b;
   }
-  Vec3 middle() const {
-    Vec3 d;
-    d[k] = sign;
-    d[k1] = a;
-    d[k2] = b;
-    return d;
-  }
+  // Chosen, not indexed: what is stored by one index and read by another waits.
+  Vec3 middle() const { return k == 0 ? Vec3(sign, a, b) : k == 1 ? Vec3(b, sign, a) : Vec3(a, b, sign); }
   // Whether D . g >= level |D| at all four, level >= 0.
   bool above(const Vec3& g, double level) const {
-    const Lane4 height = sign * g[k] + g[k1] * at_a + g[k2] * at_b,
-                left = height * height - level * level * length2;
-    const auto low = [](const Lane4& x) { return std::min(std::min(x[0], x[1]), std::min(x[2], x[3])); };
-    return low(height) >= 0 && low(left) >= 0;
+    const double g0 = k == 0   ? g[0]
+                      : k == 1 ? g[1]
+                               : g[2],
+                 g1 = k == 0   ? g[1]
+                      : k == 1 ? g[2]
+                               : g[0],
+                 g2 = k == 0   ? g[2]
+                      : k == 1 ? g[0]
+                               : g[1];
+    const Lane4 height = sign * g0 + g1 * at_a + g2 * at_b;
+    const Mask4 below = (height < 0.0) | (height * height < level * level * length2);
+    return none_of(below);
   }
 };
 
@@ -119,9 +130,16 @@ class DeepSearch {
   }
 
  private:
-  const InnerNode& node_a(const Vec3& d) const { return pair_.a->inner_map.nodes[pair_.a->atlas.nearest(d)]; }
-  const InnerNode& node_b(const Vec3& on_b) const {
-    return pair_.b->inner_map.nodes[pair_.b->atlas.nearest(on_b)];
+  // DirectionAtlas::nearest, of an atlas of known size.
+  static const InnerNode& nearest(const Shape& shape, int face, double a, double b) {
+    constexpr double kHalf = 0.5 * kAtlasCells;
+    const int i = static_cast<int>(a * kHalf + (kHalf + 0.5)),
+              j = static_cast<int>(b * kHalf + (kHalf + 0.5));
+    return shape.inner_map.nodes[(face * (kAtlasCells + 1) + i) * (kAtlasCells + 1) + j];
+  }
+  static const InnerNode& nearest(const Shape& shape, const Vec3& d) {
+    const CubePoint c = to_cube(d);
+    return nearest(shape, c.face, c.a, c.b);
   }
 
   bool serves() const {
@@ -165,8 +183,9 @@ class DeepSearch {
     for (int k = 0; k < caps_; ++k)
       if (corners.above(cap_[k].d, cap_[k].cosine)) return true;
     const Vec3 middle = corners.middle();
-    const InnerNode &a = node_a(middle), &b = node_b(pair_.direction_on_b(middle));
-    const Radii r = radii(a, b, cap_of_depth(cell.depth));
+    const InnerNode &a = nearest(*pair_.a, cell.face(), corners.a, corners.b),
+                    &b = nearest(*pair_.b, pair_.direction_on_b(middle));
+    const Radii r = radii(a, b, cap_of_depth(cell.depth()));
     const Vec3 g = pair_.scale_a * a.point - r.a * a.normal -
                    (pair_.offset + pair_.turn * (pair_.scale_b * b.point - r.b * b.normal));
     return corners.above(g, r.level + noise_);
@@ -176,7 +195,7 @@ class DeepSearch {
   bool excluded_by_supports(const DirectionCell& cell, const Corners& corners) {
     if (++supports_ > kMostSupports) return false;
     const Vec3 middle = corners.middle(), d = middle.normalized(), on_b = pair_.direction_on_b(d);
-    const Radii r = radii(node_a(d), node_b(on_b), cap_of_depth(cell.depth));
+    const Radii r = radii(nearest(*pair_.a, d), nearest(*pair_.b, on_b), cap_of_depth(cell.depth()));
     const Support a = find_hull_support(*pair_.a, d, &best_.base_a,
                                         kSupportShare * tolerance_ / pair_.scale_a),
                   b = find_hull_support(*pair_.b, on_b, &best_.base_b,
@@ -295,9 +314,9 @@ class DeepSearch {
   bool first_cells() {
     constexpr int n = 1 << kFirstDepth;
     DirectionGuess lowest{Vec3::Zero(), threshold_};
-    for (short face = 0; face < 6; ++face)
-      for (short i = 0; i < n; ++i)
-        for (short j = 0; j < n; ++j) {
+    for (int face = 0; face < 6; ++face)
+      for (int i = 0; i < n; ++i)
+        for (int j = 0; j < n; ++j) {
           const DirectionCell cell{face, kFirstDepth, i, j};
           const Corners corners(cell);
           if (threshold_ < kFarAway && excluded(cell, corners)) continue;
@@ -307,7 +326,7 @@ class DeepSearch {
           if (p < lowest.p) lowest = {d, p};
         }
     cells_ = 6 * n * n;
-    if (lowest.d.squaredNorm() > 0) look(refine_guess(pair_, lowest).d);
+    if (lowest.d.squaredNorm() > 0) look(lowest.d);
     return closed_;
   }
 
@@ -317,22 +336,22 @@ class DeepSearch {
       const DirectionCell cell = cell_[--count_];
       const Corners corners(cell);
       if (excluded(cell, corners)) continue;
-      if (cell.depth >= kNewtonDepth && (cell.depth - kNewtonDepth) % 2 == 0 && far_from_caps(corners)) {
+      if (cell.depth() >= kNewtonDepth && (cell.depth() - kNewtonDepth) % 2 == 0 && far_from_caps(corners)) {
         const int caps = caps_;
         const double threshold = threshold_;
         if (!look(corners.middle())) return false;
         if ((caps_ > caps || threshold_ < threshold) && excluded(cell, corners)) continue;
       }
-      if (cell.depth >= kSupportDepth && excluded_by_supports(cell, corners)) continue;
-      if (cell.depth == kDeepest) {
+      if (cell.depth() >= kSupportDepth && excluded_by_supports(cell, corners)) continue;
+      if (cell.depth() == kDeepest) {
         if (give_up_margin() && excluded(cell, corners)) continue;
         return false;
       }
-      const short depth = cell.depth + 1, i = 2 * cell.i, j = 2 * cell.j, i1 = i + 1, j1 = j + 1;
-      cell_[count_++] = {cell.face, depth, i, j};
-      cell_[count_++] = {cell.face, depth, i, j1};
-      cell_[count_++] = {cell.face, depth, i1, j};
-      cell_[count_++] = {cell.face, depth, i1, j1};
+      const int depth = cell.depth() + 1, i = 2 * cell.i(), j = 2 * cell.j(), i1 = i + 1, j1 = j + 1;
+      cell_[count_++] = DirectionCell(cell.face(), depth, i, j);
+      cell_[count_++] = DirectionCell(cell.face(), depth, i, j1);
+      cell_[count_++] = DirectionCell(cell.face(), depth, i1, j);
+      cell_[count_++] = DirectionCell(cell.face(), depth, i1, j1);
     }
     return true;
   }
