@@ -28,4 +28,22 @@ inline int cube_cell(double coordinate, int cells) {
   return std::clamp(static_cast<int>((coordinate + 1) * (0.5 * cells)), 0, cells - 1);
 }
 
+// Calls visit(number) for every cell that a cap of directions, at most 0.3 rad wide, may touch: (face * cells
+// + i) * cells + j. (Further cells are called too; a face whose axis is at cosine 0.3 is out of reach.)
+template <class Visit>
+void visit_cells(const Vec3& center, double angle, int cells, const Visit& visit) {
+  for (int k = 0; k < 3; ++k)
+    for (const double side : {1.0, -1.0}) {
+      const double major = side * center[k];
+      if (major < 0.3) continue;
+      const double a = center[(k + 1) % 3] / major, b = center[(k + 2) % 3] / major;
+      const double reach = 1.3 * angle * (1 + a * a + b * b);
+      if (std::abs(a) - reach > 1 || std::abs(b) - reach > 1) continue;
+      const int face = (2 * k + (side < 0)) * cells;
+      for (int i = cube_cell(a - reach, cells); i <= cube_cell(a + reach, cells); ++i)
+        for (int j = cube_cell(b - reach, cells); j <= cube_cell(b + reach, cells); ++j)
+          visit((face + i) * cells + j);
+    }
+}
+
 }  // namespace nurbs

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <limits>
 
+#include "body/cube_map.h"
 #include "body/shape.h"
 #include "body/surface_bounds.h"
 #include "nurbs/tolerances.h"
@@ -15,7 +16,8 @@ namespace {
 
 constexpr int kCaps = static_cast<int>(kInnerCaps.size()), kStretches = static_cast<int>(kStretchCaps.size());
 constexpr double kAround = 0.65;     // rad: the widest cap, leaves of 0.1 and a node's own reach
-constexpr double kLeastShare = 0.8;  // of the least eigenvalue that a stretch keeps: the rest is its room
+constexpr double kWidestKink = 0.3;  // rad: bodies of sharper edges have next to nothing to tell
+constexpr double kLeastShare = 0.9;  // of the least eigenvalue that a stretch keeps: the rest is its room
 constexpr double kTiltShare = 0.05;  // of a stretch given away for the tilt of its direction
 constexpr double kCosineRoundoff = 1e-6;  // of the nodes' normals, which are kept as floats here
 constexpr float kLarge = std::numeric_limits<float>::max();
@@ -50,52 +52,45 @@ double kink_at(const Shape& shape, const Cell& c) {
   return kink;
 }
 
-class Painter {
+// What no leaf has touched is 0, as what a leaf without normals has.
+float or_none(float x) {
+  return x < kLarge ? x : 0;
+}
+float threshold(double angle) {
+  return angle < M_PI ? static_cast<float>(std::cos(angle) - kCosineRoundoff) : -2;
+}
+// Four patches meet in a corner: no two normals there are further apart than their kinks together.
+double widest_kink(const Shape& shape) {
+  return kGapsCrossed * std::max(shape.proofs.opening, shape.proofs.closing);
+}
+
+// The radii.
+class NodePainter {
  public:
-  Painter(const Shape& shape, InnerMap& map) : shape_(shape), map_(map), count_(map.nodes.size()) {
+  NodePainter(const Shape& shape, InnerMap& map) : shape_(shape), map_(map), count_(map.nodes.size()) {
     for (auto& n : normal_) n.resize(count_);
     for (std::size_t i = 0; i < count_; ++i)
       for (int k = 0; k < 3; ++k) normal_[k][i] = static_cast<float>(map.nodes[i].normal[k]);
-    Least none;
-    none.radius.fill(kLarge);
-    none.least.fill(kLarge);
+    std::array<float, kCaps> none;
+    none.fill(kLarge);
     least_.assign(count_, none);
-    nearest_.assign(count_, -2);
     cosine_.resize(count_);
   }
 
   void paint(const std::vector<Leaf>& leaves) {
-    // Four patches meet in a corner: no two normals there are further apart than their kinks together.
-    const double widest = kGapsCrossed * std::max(shape_.proofs.opening, shape_.proofs.closing);
     for (const Leaf& leaf : leaves) {
       const CellBounds& b = leaf.bounds;
-      const float radius = b.regular ? down(b.min_radius) : 0, least = b.regular ? down(stretch(b)) : 0;
-      const double crease = b.regular && kink_at(shape_, leaf.cell) > kNoKink ? widest : 0;
+      const double crease = b.regular && kink_at(shape_, leaf.cell) > kNoKink ? widest_kink(shape_) : 0;
       see(b.axis, b.regular ? threshold(b.cone + crease + kInnerCaps.back()) : -2);
-      lower(b.regular ? b.cone : M_PI, radius, least);
-      if (crease > 0) lower(b.cone + crease, 0, 0);
-      follow(b);
+      lower(b.regular ? b.cone : M_PI, b.regular ? down(b.min_radius) : 0);
+      if (crease > 0) lower(b.cone + crease, 0);
     }
     const double all = shape_.joints.none() ? shape_.patch_curvature.min_radius : 0;
     for (std::size_t i = 0; i < count_; ++i)
-      for (int k = 0; k < kCaps; ++k)
-        map_.nodes[i].radius[k] = std::max(down(all), least_[i].radius[k] < kLarge ? least_[i].radius[k] : 0);
-    begin_stretches();
-    for (const Leaf& leaf : leaves) limit(leaf);
-    for (InnerStretch& s : map_.stretches)
-      for (int k = 0; k < kStretches; ++k) {
-        if (!(s.least[k] < down(all))) continue;
-        s.least[k] = down(all);
-        s.most[k] = 0;
-      }
+      for (int k = 0; k < kCaps; ++k) map_.nodes[i].radius[k] = std::max(down(all), or_none(least_[i][k]));
   }
 
  private:
-  static double stretch(const CellBounds& b) { return b.stretch.least * std::cos(b.cone) * std::cos(b.cone); }
-  static float threshold(double angle) {
-    return angle < M_PI ? static_cast<float>(std::cos(angle) - kCosineRoundoff) : -2;
-  }
-
   // The nodes whose normals have a cosine above `from` with a leaf's axis.
   void see(const Vec3& axis, float from) {
     const auto x = static_cast<float>(axis[0]), y = static_cast<float>(axis[1]),
@@ -112,41 +107,103 @@ class Painter {
     }
   }
   // What may touch a cap is within `cone` of the axis.
-  void lower(double cone, float radius, float least) {
-    float in_cap[kCaps], in_stretch[kStretches];
-    for (int k = 0; k < kCaps; ++k) in_cap[k] = threshold(cone + kInnerCaps[k]);
-    for (int k = 0; k < kStretches; ++k) in_stretch[k] = threshold(cone + kStretchCaps[k]);
-    for (const int i : seen_) {
-      Least& to = least_[i];
-      for (int k = kCaps - 1; k >= 0 && cosine_[i] >= in_cap[k]; --k)
-        to.radius[k] = std::min(to.radius[k], radius);
-      for (int k = kStretches - 1; k >= 0 && cosine_[i] >= in_stretch[k]; --k)
-        to.least[k] = std::min(to.least[k], least);
-    }
+  void lower(double cone, float radius) {
+    float within[kCaps];
+    for (int k = 0; k < kCaps; ++k) within[k] = threshold(cone + kInnerCaps[k]);
+    for (const int i : seen_)
+      for (int k = kCaps - 1; k >= 0 && cosine_[i] >= within[k]; --k)
+        least_[i][k] = std::min(least_[i][k], radius);
   }
 
-  // Each node's direction of stretch is that of the leaf nearest to it.
-  void follow(const CellBounds& b) {
-    for (const int i : seen_) {
-      if (!(cosine_[i] > nearest_[i])) continue;
-      nearest_[i] = cosine_[i];
-      for (int k = 0; k < 3; ++k) map_.stretches[i].along[k] = static_cast<float>(b.stretch.along[k]);
-    }
+  const Shape& shape_;
+  InnerMap& map_;
+  const std::size_t count_;
+  std::array<std::vector<float>, 3> normal_;
+  std::vector<std::array<float, kCaps>> least_;
+  std::vector<float> cosine_;
+  std::vector<int> seen_;
+  const float narrow_ = static_cast<float>(std::cos(kAround - M_SQRT2 / kAtlasCells) + kCosineRoundoff);
+};
+
+// The stretches.
+class StretchPainter {
+ public:
+  StretchPainter(const Shape& shape, InnerMap& map)
+      : shape_(shape), cells_(map.stretches), nearest_(cells_.size(), -2) {
+    for (InnerStretch& s : cells_) s.least.fill(kLarge);
   }
 
-  void begin_stretches() {
-    for (std::size_t i = 0; i < count_; ++i) {
-      InnerStretch& s = map_.stretches[i];
-      const Vec3& n = map_.nodes[i].normal;
+  void paint(const std::vector<Leaf>& leaves) {
+    for (const Leaf& leaf : leaves) {
+      const CellBounds& b = leaf.bounds;
+      const double upright = std::cos(b.cone);
+      lower(b, b.cone, b.regular ? down(b.stretch.least * upright * upright) : 0, true);
+      if (b.regular && kink_at(shape_, leaf.cell) > kNoKink) lower(b, b.cone + widest_kink(shape_), 0, false);
+    }
+    begin();
+    for (const Leaf& leaf : leaves) limit(leaf);
+    const float all = down(shape_.joints.none() ? shape_.patch_curvature.min_radius : 0);
+    for (InnerStretch& s : cells_)
+      for (int k = 0; k < kStretches; ++k) {
+        if (!(s.least[k] < all)) continue;
+        s.least[k] = all;
+        s.most[k] = 0;
+      }
+  }
+
+ private:
+  static const std::vector<Vec3>& middles() {
+    static const std::vector<Vec3> all = [] {
+      std::vector<Vec3> d(6 * kStretchCells * kStretchCells);
+      for (std::size_t i = 0; i < d.size(); ++i) d[i] = InnerMap::middle(static_cast<int>(i));
+      return d;
+    }();
+    return all;
+  }
+
+  // Calls visit(cell, cosine, caps) for cells of which the `caps` widest may be touched by what is within
+  // `cone` of the axis.
+  template <class Visit>
+  void visit(const CellBounds& b, double cone, const Visit& visit) const {
+    const std::vector<Vec3>& middle = middles();
+    float within[kStretches];
+    for (int k = 0; k < kStretches; ++k) within[k] = b.regular ? threshold(cone + kStretchCaps[k]) : -2;
+    const auto look = [&](int cell) {
+      const auto cosine = static_cast<float>(b.axis.dot(middle[cell]));
+      int first = kStretches;
+      while (first > 0 && cosine >= within[first - 1]) --first;
+      if (first < kStretches) visit(cell, cosine, first);
+    };
+    const double widest = cone + kStretchCaps[kStretches - 1] + 1e-3;
+    if (b.regular && widest <= 0.3)
+      visit_cells(b.axis, widest, kStretchCells, look);
+    else
+      for (int cell = 0; cell < static_cast<int>(cells_.size()); ++cell) look(cell);
+  }
+
+  // A cell's direction is that of the leaf nearest to it.
+  void lower(const CellBounds& b, double cone, float least, bool lead) {
+    visit(b, cone, [&](int cell, float cosine, int first) {
+      InnerStretch& s = cells_[cell];
+      for (int k = first; k < kStretches; ++k) s.least[k] = std::min(s.least[k], least);
+      if (!lead || !(cosine > nearest_[cell])) return;
+      nearest_[cell] = cosine;
+      for (int k = 0; k < 3; ++k) s.along[k] = static_cast<float>(b.stretch.along[k]);
+    });
+  }
+
+  void begin() {
+    for (std::size_t i = 0; i < cells_.size(); ++i) {
+      InnerStretch& s = cells_[i];
+      const Vec3& n = middles()[i];
       Vec3 f(s.along[0], s.along[1], s.along[2]);
       f -= n.dot(f) * n;
       const bool some = f.norm() > 0.5;
       if (some) f.normalize();
       for (int k = 0; k < 3; ++k) s.along[k] = static_cast<float>(f[k]);
       for (int k = 0; k < kStretches; ++k) {
-        const bool seen = some && least_[i].least[k] < kLarge;
-        s.least[k] = seen ? down(kLeastShare * least_[i].least[k]) : 0;
-        s.most[k] = seen && s.least[k] > 0 ? 1e30f : 0;
+        s.least[k] = some ? down(kLeastShare * or_none(s.least[k])) : 0;
+        s.most[k] = s.least[k] > 0 ? 1e30f : 0;
       }
     }
   }
@@ -158,17 +215,14 @@ class Painter {
   void limit(const Leaf& leaf) {
     const CellBounds& b = leaf.bounds;
     if (!b.regular) return;  // there the least is 0, and so is the most
-    float within[kStretches];
-    for (int k = 0; k < kStretches; ++k) within[k] = threshold(b.cone + kStretchCaps[k]);
-    see(b.axis, within[kStretches - 1]);
     const double c2 = std::cos(b.cone) * std::cos(b.cone), s2 = 1 - c2;
     const Vec3 &f1 = b.stretch.along, f2 = b.axis.cross(f1);
-    for (const int i : seen_) {
-      InnerStretch& s = map_.stretches[i];
+    visit(b, b.cone, [&](int cell, float, int first) {
+      InnerStretch& s = cells_[cell];
       const Vec3 f(s.along[0], s.along[1], s.along[2]);
       const double x = f.dot(f1), y = f.dot(f2), z = f.dot(b.axis);
-      for (int k = 0; k < kStretches; ++k) {
-        if (!(s.most[k] > 0) || !(cosine_[i] >= within[k])) continue;
+      for (int k = first; k < kStretches; ++k) {
+        if (!(s.most[k] > 0)) continue;
         double r = std::min<double>(s.most[k], b.stretch.most);
         const double m = (s.least[k] + r * (1 + 1 / kTiltShare) * z * z * s2) / c2;
         const double d1 = b.stretch.most - m, d2 = b.stretch.least - m;
@@ -176,36 +230,44 @@ class Painter {
         r = d1 > 0 && d2 > 0 ? std::min(r, d1 * d2 / (worth * (1 + kTiltShare))) : 0;
         s.most[k] = down(r * (1 - 1e-6));
       }
-    }
+    });
   }
 
   const Shape& shape_;
-  InnerMap& map_;
-  const std::size_t count_;
-  std::array<std::vector<float>, 3> normal_;
-  struct Least {
-    std::array<float, kCaps> radius;
-    std::array<float, kStretches> least;
-  };
-  std::vector<Least> least_;
-  std::vector<float> nearest_, cosine_;
-  std::vector<int> seen_;
-  const float narrow_ = static_cast<float>(std::cos(kAround - M_SQRT2 / kAtlasCells) + kCosineRoundoff);
+  std::vector<InnerStretch>& cells_;
+  std::vector<float> nearest_;
 };
 
 }  // namespace
 
+Vec3 InnerMap::middle(int cell) {
+  constexpr int n = kStretchCells;
+  const int face = cell / (n * n), i = cell / n % n, j = cell % n, k = face / 2;
+  Vec3 d;
+  d[k] = face % 2 ? -1 : 1;
+  d[(k + 1) % 3] = (2.0 * i + 1) / n - 1;
+  d[(k + 2) % 3] = (2.0 * j + 1) / n - 1;
+  return d.normalized();
+}
+
+int InnerMap::cell(const Vec3& d) {
+  const CubePoint c = to_cube(d);
+  return (c.face * kStretchCells + cube_cell(c.a, kStretchCells)) * kStretchCells +
+         cube_cell(c.b, kStretchCells);
+}
+
 InnerMap make_inner_map(const Shape& shape, const SurfaceBounds& bounds) {
   InnerMap map;
-  if (shape.dented() || shape.joint_slack > 0) return map;
+  if (shape.dented() || shape.joint_slack > 0 || widest_kink(shape) > kWidestKink) return map;
   const DirectionAtlas& atlas = shape.atlas;
   map.nodes.resize(atlas.nodes());
-  map.stretches.resize(atlas.nodes());
+  map.stretches.resize(6 * kStretchCells * kStretchCells);
   for (int i = 0; i < atlas.nodes(); ++i) {
     map.nodes[i].point = atlas.point[i];
     map.nodes[i].normal = atlas.direction(i).normalized();
   }
-  Painter(shape, map).paint(bounds.leaves);
+  NodePainter(shape, map).paint(bounds.leaves);
+  StretchPainter(shape, map).paint(bounds.leaves);
   return map;
 }
 

@@ -13,9 +13,10 @@ namespace nurbs {
 struct Shape;
 struct SurfaceBounds;
 
-// rad: within these angles of a node's normal its radii hold, and the eigenvalues of its stretch.
+// rad: within these angles of a node's normal its radii hold, and of a cell's middle its eigenvalues.
 constexpr std::array<double, 4> kInnerCaps = {0.14, 0.18, 0.27, 0.45};
-constexpr std::array<double, 3> kStretchCaps = {0.1, 0.14, 0.18};
+constexpr std::array<double, 3> kStretchCaps = {0.05, 0.08, 0.12};
+constexpr int kStretchCells = 32;  // per cube edge
 
 // At each node of the direction atlas. Let W be the inverse Weingarten map (W = dx/dn) at a support point.
 // Where every W that belongs to a direction within kInnerCaps[k] of `normal` has
@@ -31,16 +32,19 @@ struct InnerNode {
 };
 static_assert(sizeof(InnerNode) == 64, "a line of cache");
 
-// The same for bodies that bend much more one way than the other: within kStretchCaps[k] of the node's normal
+// The same, finer, and for bodies that bend much more one way than the other: in a cell of a cube map, within
+// kStretchCaps[k] of its middle,
 //     W(v, v) >= least[k] + most[k] (along . v)^2.
 struct InnerStretch {
-  std::array<float, 3> along = {0, 0, 0};  // unit, square to the normal
+  std::array<float, 3> along = {0, 0, 0};  // unit, square to the middle
   std::array<float, 3> least = {0, 0, 0}, most = {0, 0, 0};
 };
 
 struct InnerMap {
   std::vector<InnerNode> nodes;  // none: the hypotheses do not hold
   std::vector<InnerStretch> stretches;
+  static int cell(const Vec3& d);  // that d lies in
+  static Vec3 middle(int cell);    // unit, at most 0.045 rad from all that lies in it
 };
 
 // Of a shape whose atlas is done. From the leaves of `bounds`, whose normals and curvatures are proven,

@@ -20,18 +20,8 @@ constexpr double kInfinity = std::numeric_limits<double>::infinity();
 // Raises the radius of every cell that a cap of directions may touch.
 void paint(const Vec3& center, double angle, double radius, NormalMap& map) {
   const float value = std::nextafter(static_cast<float>(radius), std::numeric_limits<float>::infinity());
-  for (int k = 0; k < 3; ++k)
-    for (const double side : {1.0, -1.0}) {
-      const double major = side * center[k];
-      if (major < 0.3) continue;  // further than a cap from this face: those are at most kNormalCap wide
-      const double a = center[(k + 1) % 3] / major, b = center[(k + 2) % 3] / major;
-      const double reach = 1.3 * angle * (1 + a * a + b * b);
-      if (std::abs(a) - reach > 1 || std::abs(b) - reach > 1) continue;
-      float* face = map.radius.data() + (2 * k + (side < 0)) * map.cells * map.cells;
-      for (int i = cube_cell(a - reach, map.cells); i <= cube_cell(a + reach, map.cells); ++i)
-        for (int j = cube_cell(b - reach, map.cells); j <= cube_cell(b + reach, map.cells); ++j)
-          face[i * map.cells + j] = std::max(face[i * map.cells + j], value);
-    }
+  visit_cells(center, angle, map.cells,
+              [&](int cell) { map.radius[cell] = std::max(map.radius[cell], value); });
 }
 
 // The same for caps of any width.

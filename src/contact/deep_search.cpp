@@ -20,13 +20,10 @@ constexpr int kMostSupports = 60;
 constexpr int kMostCells = 800;
 constexpr int kMostNewtons = 12;
 constexpr int kMostCaps = 8;
-// A cap grows over the stretches' and the radii's, which are the same but for the first.
-constexpr int kStretches = static_cast<int>(kStretchCaps.size()),
-              kCapSteps = static_cast<int>(kInnerCaps.size()) + 1;
-static_assert(kStretchCaps[1] == kInnerCaps[0] && kStretchCaps[2] == kInnerCaps[1]);
-constexpr double kLeastCap = 0.02;       // rad: about the best minimum; less would leave thousands of cells
+constexpr int kStretches = static_cast<int>(kStretchCaps.size()), kCaps = static_cast<int>(kInnerCaps.size());
+constexpr double kLeastCap = 0.012;      // rad: about the best minimum; less would leave thousands of cells
 constexpr double kFromThreshold = 0.25;  // of the tolerance, between the least p found and what is proven
-constexpr double kSlack = 0.1;           // of a stretch, given away for the tilt of its direction
+constexpr double kSlack = 0.02;          // of a stretch, given away for the tilt of its direction
 constexpr double kCapRoundoff = 1e-7;    // rad: angles are arc cosines
 
 // What the inner maps' caps have to reach by cells of a depth: half a cell's diagonal, and half of one of the
@@ -265,22 +262,29 @@ class DeepSearch {
         -s.bracket.lower - kFromThreshold * tolerance_ > threshold_ ? this->level() : threshold_;
     const Vec3& d = s.bracket.direction;
     const Vec3 g = s.jet_a.at(JetLanes::kS) - s.jet_b.at(JetLanes::kS), on_b = pair_.direction_on_b(d);
-    const int a = pair_.a->atlas.nearest(d), b = pair_.b->atlas.nearest(on_b);
-    const InnerNode &na = pair_.a->inner_map.nodes[a], &nb = pair_.b->inner_map.nodes[b];
-    const double off =
-        std::acos(std::min(1.0, std::min(d.dot(na.normal), on_b.dot(nb.normal)))) + kCapRoundoff;
+    const InnerNode &na = nearest(*pair_.a, d), &nb = nearest(*pair_.b, on_b);
+    const int cell_a = InnerMap::cell(d), cell_b = InnerMap::cell(on_b);
+    const InnerStretch &sa = pair_.a->inner_map.stretches[cell_a], &sb = pair_.b->inner_map.stretches[cell_b];
+    const auto off = [&](const Vec3& middle_a, const Vec3& middle_b) {
+      return std::acos(std::min(1.0, std::min(d.dot(middle_a), on_b.dot(middle_b)))) + kCapRoundoff;
+    };
+    const double off_node = off(na.normal, nb.normal),
+                 off_stretch = off(InnerMap::middle(cell_a), InnerMap::middle(cell_b));
     double y = d.dot(g),
            slope = -((g - y * d).norm() + widest_ * (std::sqrt(s.bracket.angle2) + kPoleNormal));
     double proven = 0;
-    for (int k = 0; k < kCapSteps; ++k) {
-      const bool by_radius = k >= kStretches;
-      const double to = (by_radius ? kInnerCaps[k - 1] : kStretchCaps[k]) - off, step = to - proven;
+    for (int n = 0; n < kStretches + kCaps; ++n) {
+      // Over the stretches' caps, then the radii's; each by the narrowest that reach as far.
+      const double to =
+          n < kStretches ? kStretchCaps[n] - off_stretch : kInnerCaps[n - kStretches] - off_node;
+      const double step = to - proven;
       if (!(step > 0)) continue;
-      double m = by_radius
-                     ? 0
-                     : stretched(d, to, k, pair_.a->inner_map.stretches[a], pair_.b->inner_map.stretches[b]);
-      const int r = std::max(0, k - 1);
-      m = std::max(m, pair_.scale_a * na.radius[r] + pair_.scale_b * nb.radius[r]);
+      int k = 0, r = 0;
+      while (k < kStretches && kStretchCaps[k] - off_stretch < to) ++k;
+      while (r < kCaps && kInnerCaps[r] - off_node < to) ++r;
+      double m = 0;
+      if (k < kStretches) m = stretched(d, to, k, sa, sb);
+      if (r < kCaps) m = std::max(m, pair_.scale_a * na.radius[r] + pair_.scale_b * nb.radius[r]);
       // y'' + y = m. Falling, it has its least value where it turns; rising at first, at an end.
       const double above = y - m;
       const double end = m + above * std::cos(step) + slope * std::sin(step);
