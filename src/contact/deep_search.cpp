@@ -330,7 +330,7 @@ class DeepSearch {
           if (p < lowest.p) lowest = {d, p};
         }
     cells_ = 6 * n * n;
-    if (lowest.d.squaredNorm() > 0) look(lowest.d);
+    if (lowest.d.squaredNorm() > 0) look(refine_guess(pair_, lowest).d);
     return closed_;
   }
 

@@ -8,23 +8,25 @@ namespace nurbs {
 
 // Makes *best, a stationary pair or nothing (iterations 0), the global minimum of p(d) = h_A(d) + h_B(-d) -
 // d . offset, with a closed bracket; false, and *best as it was, where the proof does not succeed: bodies
-// with flats, dents or joints that gape, minima that are no strict ones or lie in creases. 3 to 10 us.
+// with flats, sharp edges or dents, joints that gape, minima that are hardly ones or lie in creases. 5 to 20
+// us.
 //
 // Proof, for a depth T a quarter of `tolerance` below the least p found. The sphere of directions is covered
 // by
 //   * cells of a cube map, halved until every direction in them has p(d) >= T. By the inner maps' nodes
-//     nearest to the cell's middle (x_K, n_K, and radii r_K that hold as far as the cell's corners)
-//         p(d) >= d . g + r_A + r_B,   g = (x_A - r_A n_A) - (x_B - r_B n_B),
-//     and along an edge of the cell D . g - (T - r_A - r_B) |D|, D = d times any factor, is concave where
-//     radii are cut to T in sum: what holds at the four corners holds in the cell.
+//     nearest to the cell's middle (x_K, n_K, and radii r_K that hold as far as the cell's corners), for
+//     small cells by the supports along the middle,
+//         p(d) >= d . g + r_A + r_B,   g = (x_A - r_A n_A) - (x_B - r_B n_B) - offset,
+//     and D . g - (T - r_A - r_B) |D|, D = d times any factor, is concave on the cube's face, radii being cut
+//     to T in sum: what holds at the four corners holds in the cell.
 //   * caps about local minima. If W_A + W_B >= m (as forms) for all directions within t of d, then by p'' + p
 //     >= m along great circles p there is at least the solution of y'' + y = m with y(0) = d . (a - b), a and
 //     b any points of the bodies, and y'(0) = -s, s a bound of p's slope at d: |a - b across d| and the
 //     largest curvature radii times the angles between d and the normals at a and b. m comes from the nodes
-//     nearest to d, in steps over their caps.
-//
-// `proof`, if asked for, is filled for the steps to come: then caps and levels keep a margin, which costs
-// some more cells. False in proof->level where none is to be had: two minima as good as each other.
+//     and cells nearest to d, in steps over their caps.
+// Hypotheses: those of the inner maps, and finite curvature radii; both are checked. `proof`, if asked for,
+// is filled for the steps to come: cells then have to lie above T by a margin, and caps are cut, which costs
+// some more cells; its level is 0 where none is to be had, as of two minima as good as each other.
 struct DeepProof;
 bool search_deep(const PairFrame& pair, double tolerance, JointSolution* best, DeepProof* proof = nullptr);
 
