@@ -1,5 +1,5 @@
 #!/usr/bin/python3
-"""Discharge rates and a picture of the runs of in.hopper: plot.py FOLDER. Reads FOLDER/SHAPE/discharge.txt."""
+"""Discharge rates and a picture of the runs of in.hopper: plot.py FOLDER. Reads FOLDER/SHAPE-SEED/discharge.txt."""
 import pathlib
 import sys
 
@@ -20,30 +20,34 @@ def discharge(folder):
     return t - t[0], left
 
 
-def rate(folder):
-    """Grains a second, and its standard error by tenths of the time (flow fluctuates)."""
-    t, left = discharge(folder)
-    t, left = t[t >= STEADY], left[t >= STEADY]
-    ends = np.linspace(0, len(t) - 1, 11).astype(int)
-    parts = -np.diff(left[ends]) / np.diff(t[ends])
-    return parts.mean(), parts.std(ddof=1) / np.sqrt(len(parts))
+def rate(folders):
+    """Grains a second, and its standard error by the fillings; of one filling by tenths of the time."""
+    parts = []
+    for folder in folders:
+        t, left = discharge(folder)
+        t, left = t[t >= STEADY], left[t >= STEADY]
+        ends = np.linspace(0, len(t) - 1, 11).astype(int)
+        parts.append(-np.diff(left[ends]) / np.diff(t[ends]))
+    of = np.mean(parts, axis=1) if len(parts) > 1 else np.array(parts[0])
+    return of.mean(), of.std(ddof=1) / np.sqrt(len(of))
 
 
 def main(folder):
-    shapes = [s for s in ASPECT if (folder / s / "discharge.txt").exists()]
-    rates = {s: rate(folder / s) for s in shapes}
+    runs = {s: sorted(f.parent for f in folder.glob(f"{s}-*/discharge.txt")) for s in ASPECT}
+    shapes = [s for s in ASPECT if runs[s]]
+    rates = {s: rate(runs[s]) for s in shapes}
     grain = 2 * 3e-3
     beverloo = 0.58 * 0.6 * DENSITY * np.sqrt(G) * (HOLE - 1.4 * grain) ** 2.5 / (DENSITY * VOLUME)
     with open(folder / "rates.csv", "w") as f:
-        print("shape,aspect,grains_per_second,error,to_spheres", file=f)
+        print("shape,aspect,grains_per_second,error,fillings,to_spheres", file=f)
         for s in shapes:
-            print(f"{s},{ASPECT[s]},{rates[s][0]:.1f},{rates[s][1]:.1f},{rates[s][0] / rates['sphere'][0]:.3f}", file=f)
-            print(f"{s:8} a/b {ASPECT[s]}: {rates[s][0]:.0f} +- {rates[s][1]:.0f} grains/s,"
-                  f" {rates[s][0] / rates['sphere'][0]:.2f} of the spheres'")
+            mean, error, share = *rates[s], rates[s][0] / rates["sphere"][0]
+            print(f"{s},{ASPECT[s]},{mean:.1f},{error:.1f},{len(runs[s])},{share:.3f}", file=f)
+            print(f"{s:8} a/b {ASPECT[s]}: {mean:.0f} +- {error:.0f} grains/s ({len(runs[s])} fillings), {share:.2f} of the spheres'")
     print(f"Beverloo for spheres (C 0.58, k 1.4, solid fraction 0.6): {beverloo:.0f} grains/s")
     figure, axes = plt.subplots(1, 2, figsize=(9, 3.6))
     for s in shapes:
-        axes[0].plot(*discharge(folder / s), label=f"a/b {ASPECT[s]}")
+        axes[0].plot(*discharge(runs[s][0]), label=f"a/b {ASPECT[s]}")
     axes[0].set_xlabel("time, s")
     axes[0].set_ylabel("grains above the orifice")
     axes[0].legend()
@@ -56,9 +60,8 @@ def main(folder):
     axes[1].minorticks_off()
     figure.tight_layout()
     figure.savefig(folder / "discharge.png", dpi=110)
-    show = shapes[-1] if "long" not in shapes else "long"
-    draw(folder / show / "hopper-12000.vtu", folder / "hopper.png", towards=(0.3, -1, 0.25), size=(420, 800),
-         walls=[folder / show / "silo.stl"], zoom=1.5)
+    show = runs["long" if "long" in shapes else shapes[-1]][0]
+    draw(show / "hopper-12000.vtu", folder / "hopper.png", towards=(0.3, -1, 0.25), size=(420, 800), walls=[show / "silo.stl"], zoom=1.5)
 
 
 if __name__ == "__main__":
