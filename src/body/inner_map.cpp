@@ -15,8 +15,11 @@ namespace nurbs {
 namespace {
 
 constexpr int kCaps = static_cast<int>(kInnerCaps.size()), kStretches = static_cast<int>(kStretchCaps.size());
-constexpr double kAround = 0.65;     // rad: the widest cap, leaves of 0.1 and a node's own reach
-constexpr double kWidestKink = 0.3;  // rad: bodies of sharper edges have next to nothing to tell
+constexpr double kAround = 0.65;        // rad: the widest cap, leaves of 0.1 and a node's own reach
+constexpr double kWidestKink = 0.3;     // rad: bodies of sharper edges have next to nothing to tell
+constexpr double kLeafCone = 0.015;     // rad: leaves as narrow are not halved for their eigenvalues ...
+constexpr double kLeafTightness = 1.2;  // ... nor those that are known as well
+constexpr int kMostLeafCells = 3000;
 constexpr double kLeastShare = 0.9;  // of the least eigenvalue that a stretch keeps: the rest is its room
 constexpr double kTiltShare = 0.05;  // of a stretch given away for the tilt of its direction
 constexpr double kCosineRoundoff = 1e-6;  // of the nodes' normals, which are kept as floats here
@@ -256,7 +259,7 @@ int InnerMap::cell(const Vec3& d) {
          cube_cell(c.b, kStretchCells);
 }
 
-InnerMap make_inner_map(const Shape& shape, const SurfaceBounds& bounds) {
+InnerMap make_inner_map(const Shape& shape, SurfaceBounds* bounds) {
   InnerMap map;
   if (shape.dented() || shape.joint_slack > 0 || widest_kink(shape) > kWidestKink) return map;
   const DirectionAtlas& atlas = shape.atlas;
@@ -266,8 +269,9 @@ InnerMap make_inner_map(const Shape& shape, const SurfaceBounds& bounds) {
     map.nodes[i].point = atlas.point[i];
     map.nodes[i].normal = atlas.direction(i).normalized();
   }
-  NodePainter(shape, map).paint(bounds.leaves);
-  StretchPainter(shape, map).paint(bounds.leaves);
+  if (!shape.proofs.sphere) refine_stretches(kLeafCone, kLeafTightness, kMostLeafCells, bounds);
+  NodePainter(shape, map).paint(bounds->leaves);
+  StretchPainter(shape, map).paint(bounds->leaves);
   return map;
 }
 

@@ -50,6 +50,6 @@ struct InnerMap {
 // Of a shape whose atlas is done. From the leaves of `bounds`, whose normals and curvatures are proven,
 // halved further; the normals between the sides of an opening joint have radius 0, as a crease has. Some ms,
 // 170 kB.
-InnerMap make_inner_map(const Shape& shape, const SurfaceBounds& bounds);
+InnerMap make_inner_map(const Shape& shape, SurfaceBounds* bounds);
 
 }  // namespace nurbs

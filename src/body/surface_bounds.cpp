@@ -322,6 +322,30 @@ SurfaceBounds bound_surface(const Shape& shape, bool sphere) {
   return Bounder(shape).run(sphere);
 }
 
+namespace {
+
+// Halves leaves while they are loose and `spent` is below `cells`.
+template <class Loose>
+void refine(const Loose& loose, int cells, int* spent, SurfaceBounds* bounds) {
+  std::vector<Leaf> done, open = std::move(bounds->leaves);
+  while (!open.empty()) {
+    std::vector<Leaf> level;
+    level.swap(open);
+    for (Leaf& leaf : level) {
+      if (*spent >= cells || !loose(leaf.bounds) || leaf.cell.du * leaf.cell.dv < kLeastNormalCell) {
+        done.push_back(std::move(leaf));
+        continue;
+      }
+      auto [a, b] = split(bounds->even[leaf.cell.patch], leaf, false, spent);
+      open.push_back(std::move(a));
+      open.push_back(std::move(b));
+    }
+  }
+  bounds->leaves = std::move(done);
+}
+
+}  // namespace
+
 void refine_normals(double cone, double spread, int cells, SurfaceBounds* bounds) {
   int spent = 0;
   // What has no normals yet first: it would leave nothing of the map.
@@ -330,22 +354,16 @@ void refine_normals(double cone, double spread, int cells, SurfaceBounds* bounds
       if (!b.regular || b.cone > (wide ? kNormalCap : cone)) return true;
       return !wide && b.convex && b.max_radius > spread * b.seen_max;
     };
-    std::vector<Leaf> done, open = std::move(bounds->leaves);
-    while (!open.empty()) {
-      std::vector<Leaf> level;
-      level.swap(open);
-      for (Leaf& leaf : level) {
-        if (spent >= cells || !loose(leaf.bounds) || leaf.cell.du * leaf.cell.dv < kLeastNormalCell) {
-          done.push_back(std::move(leaf));
-          continue;
-        }
-        auto [a, b] = split(bounds->even[leaf.cell.patch], leaf, false, &spent);
-        open.push_back(std::move(a));
-        open.push_back(std::move(b));
-      }
-    }
-    bounds->leaves = std::move(done);
+    refine(loose, cells, &spent, bounds);
   }
+}
+
+void refine_stretches(double cone, double tightness, int cells, SurfaceBounds* bounds) {
+  int spent = 0;
+  const auto loose = [&](const CellBounds& b) {
+    return b.regular && b.convex && b.cone > cone && tightness * b.stretch.least < b.seen_min;
+  };
+  refine(loose, cells, &spent, bounds);
 }
 
 }  // namespace nurbs

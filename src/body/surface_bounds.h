@@ -42,4 +42,8 @@ bool is_flat(const CellBounds& bounds, double size);
 // is painted with.
 void refine_normals(double cone, double spread, int cells, SurfaceBounds* bounds);
 
+// Halves those that are wider than `cone` while the least eigenvalue proven of them (CellBounds::stretch) is
+// not within the factor `tightness` of the one in their middle, `cells` allowing.
+void refine_stretches(double cone, double tightness, int cells, SurfaceBounds* bounds);
+
 }  // namespace nurbs
