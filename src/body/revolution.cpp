@@ -17,6 +17,8 @@ using Real = long double;
 using Row = std::vector<Real>;
 using Point = Eigen::Matrix<Real, 3, 1>;
 
+constexpr double kSpheroidGuess = 1e-3;  // relative: how far off the moments' semi-axes may be
+
 // Line number i of a patch's control points across the arcs.
 std::vector<Vec4> line_of(const BezierPatch& patch, bool arcs_in_u, int i) {
   std::vector<Vec4> line;
@@ -171,18 +173,62 @@ double off_spheroid(const BezierPatch& patch, const Mat3& frame, double a, doubl
   return most * std::max(a, b);
 }
 
-Revolution find_spheroid(const std::vector<BezierPatch>& patches, const Mat3& gyration, double size) {
+// Semi-axes from the moments, along and across the axis; they lose digits where one is much longer.
+Revolution guess_spheroid(const Mat3& gyration, double* along, double* across) {
   const Eigen::SelfAdjointEigenSolver<Mat3> solver(gyration);
   const Vec3& moment = solver.eigenvalues();
   const int alone = moment[1] - moment[0] < moment[2] - moment[1] ? 2 : 0, other = 2 - alone;
   const double mean = 0.5 * (moment[1] + moment[other]);
-  const double a = std::sqrt(2.5 * (2 * mean - moment[alone])), b = std::sqrt(2.5 * moment[alone]);
+  *along = std::sqrt(2.5 * (2 * mean - moment[alone]));
+  *across = std::sqrt(2.5 * moment[alone]);
   Revolution r;
   r.axis = solver.eigenvectors().col(alone);
+  return r;
+}
+
+Mat3 frame_about(const Vec3& axis) {
   Mat3 frame;
-  frame << r.axis, r.axis.unitOrthogonal(), r.axis.cross(r.axis.unitOrthogonal());
+  frame << axis, axis.unitOrthogonal(), axis.cross(axis.unitOrthogonal());
+  return frame;
+}
+
+// A better guess: the quadric through points of the surface, by least squares, in coordinates in which the
+// first guess is the unit sphere. Its small departure from that tilts the axis and scales the semi-axes.
+void improve(const std::vector<BezierPatch>& patches, Revolution* r, double* along, double* across) {
+  constexpr int kPoints = 4;  // per parameter
+  const Mat3 frame = frame_about(r->axis);
+  const Vec3 semi(*along, *across, *across);
+  Eigen::Matrix<double, 9, 9> normal = Eigen::Matrix<double, 9, 9>::Zero();
+  Eigen::Matrix<double, 9, 1> right = Eigen::Matrix<double, 9, 1>::Zero();
+  for (const BezierPatch& patch : patches)
+    for (int i = 0; i < kPoints; ++i)
+      for (int k = 0; k < kPoints; ++k) {
+        const Vec3 y = (frame.transpose() * evaluate0(patch, (i + 0.5) / kPoints, (k + 0.5) / kPoints))
+                           .cwiseQuotient(semi);
+        Eigen::Matrix<double, 9, 1> row;
+        row << y[0] * y[0], y[1] * y[1], y[2] * y[2], 2 * y[0] * y[1], 2 * y[0] * y[2], 2 * y[1] * y[2], y;
+        normal += row * row.transpose();
+        right += (1 - y.squaredNorm()) * row;
+      }
+  const Eigen::Matrix<double, 9, 1> off = normal.ldlt().solve(right);
+  if (!(off.cwiseAbs().maxCoeff() < kSpheroidGuess)) return;
+  // x^2 (1 + off) = 1, and products with y and z that a small turn takes away.
+  if (std::abs(*along - *across) > kSpheroidGuess * *across) {
+    const double turn = 1 / (*across / *along - *along / *across);
+    r->axis = (r->axis + turn * (off[3] * frame.col(1) + off[4] * frame.col(2))).normalized();
+  }
+  *along /= std::sqrt(1 + off[0]);
+  *across /= std::sqrt(1 + 0.5 * (off[1] + off[2]));
+}
+
+Revolution find_spheroid(const std::vector<BezierPatch>& patches, const Mat3& gyration, double size) {
+  double along, across;
+  Revolution r = guess_spheroid(gyration, &along, &across);
+  if (!(along > 0 && across > 0)) return {};
+  for (int k = 0; k < 3; ++k) improve(patches, &r, &along, &across);
+  const Mat3 frame = frame_about(r.axis);
   for (const BezierPatch& patch : patches) {
-    r.error = std::max(r.error, off_spheroid(patch, frame, a, b));
+    r.error = std::max(r.error, off_spheroid(patch, frame, along, across));
     if (!(r.error <= kArcError * size)) return {};
   }
   r.found = true;

@@ -7,15 +7,14 @@
 namespace nurbs {
 namespace {
 
-constexpr int kMostCircles = 96;         // supports evaluated
-constexpr int kMostSectors = 1200;       // bounded, some 0.3 us each
-constexpr int kDeepestSector = 60;       // halvings of the azimuth
-constexpr double kNearAxis = 0.2;        // sine between the axes up to which both bodies' circles are used
-constexpr double kNearlyAlike = 0.01;    // of the body's radius: what directions of a ring may differ by
-constexpr double kClosedShare = 0.9;     // of the tolerance at which a sector is closed ...
-constexpr double kMeridianShare = 0.4;   // ... and below which its width, not its circles, keeps it open
-constexpr double kLeastRingSine = 1e-3;  // of the angle from the axis: nearer it, directions are no ring
-constexpr double kLeastTilt = 3e-3;      // sine between the axes from which the mate's tip may do better
+constexpr int kMostCircles = 96;        // supports evaluated
+constexpr int kMostSectors = 700;       // bounded, some 0.3 us each
+constexpr int kDeepestSector = 60;      // halvings of the azimuth
+constexpr double kNearAxis = 0.2;       // sine between the axes up to which both bodies' circles are used
+constexpr double kNearlyAlike = 0.1;    // of the body's radius: what directions of a ring may differ by
+constexpr double kClosedShare = 0.9;    // of the tolerance at which a sector is closed ...
+constexpr double kMeridianShare = 0.4;  // ... and below which its width, not its circles, keeps it open
+constexpr double kLeastTilt = 3e-3;     // sine between the axes from which the mate's tip may do better
 constexpr int kFirstAngles = 7;
 
 // One body of revolution K and its mate M: axes and lengths of the pair frame, e = sign d.
@@ -27,7 +26,8 @@ struct View {
   Vec3 offset;             // M's centre from K's
   Vec3 point, mate_point;  // on the axes, from the bodies' centres
   bool circles;            // of M are used
-  double tilt;             // sine between the axes
+  double tilt = 0;         // sine between the axes, if so
+  double mate_error = 0;   // what the mate turns out of itself by, a length of its shape
 
   View(const PairFrame& pair, bool k_is_a) {
     sign = k_is_a ? 1 : -1;
@@ -39,13 +39,21 @@ struct View {
     turn_m = k_is_a ? pair.turn : Mat3(Mat3::Identity());
     offset = sign * pair.offset;
     axis = (turn_k * k->revolution.axis).normalized();
+    point = scale_k * (turn_k * k->revolution.point);
+    if (m->proofs.sphere) {  // any axis is its own
+      mate_axis = axis;
+      mate_point = Vec3::Zero();
+      circles = true;
+      mate_error = m->bounding_radius - m->inner_radius;
+      return;
+    }
     mate_axis = (turn_m * m->revolution.axis).normalized();
     if (mate_axis.dot(axis) < 0) mate_axis = -mate_axis;
-    point = scale_k * (turn_k * k->revolution.point);
     mate_point = scale_m * (turn_m * m->revolution.point);
-    tilt = axis.cross(mate_axis).norm();
-    circles = m->revolution.found && tilt < kNearAxis;
-    if (!circles) tilt = 0;
+    mate_error = m->revolution.error;
+    const double sine = axis.cross(mate_axis).norm();
+    circles = m->revolution.found && sine < kNearAxis;
+    if (circles) tilt = sine;
   }
   Vec3 across(const Vec3& x) const { return x - axis.dot(x) * axis; }
 };
@@ -79,6 +87,15 @@ struct Least {
 
 double cross(const Angle& x, const Angle& y) {
   return x.c * y.s - x.s * y.c;
+}
+
+// An angle between `above` and `below` up to which r s + z c, that high at them, is at least `threshold`: it
+// is linear along the chord.
+Angle level_at(const Angle& above, const Angle& below, double high, double low, double threshold) {
+  if (!(above.c * below.c + above.s * below.s > 0 && high > threshold && threshold > 0)) return above;
+  const double t = (high - threshold) / (high - low), c = above.c + t * (below.c - above.c),
+               s = above.s + t * (below.s - above.s), length = std::hypot(c, s);
+  return {c / length, s / length};
 }
 
 // Between two points of the polygon the support function is concave where positive: its minimum and all that
@@ -115,11 +132,11 @@ Least least_of_greatest(const Meridian* p, int count, Angle low, Angle high, dou
     const double h = height(top, next);
     if (h < least.value) least = {h, next, top, over, least.low, least.high};
     if (h < threshold) {
-      if (!some) least.low = now;
+      if (!some) least.low = level_at(now, next, height(top, now), h, threshold);
       some = open = true;
       least.high = high;
     } else if (open) {
-      least.high = next;
+      least.high = level_at(next, now, h, height(top, now), threshold);
       open = false;
     }
     now = next;
@@ -137,14 +154,14 @@ class RingSearch {
     noise_ = 2 * kRoundoff *
                  (view_.scale_k * view_.k->bounding_radius + view_.scale_m * view_.m->bounding_radius) +
              view_.scale_k * view_.k->revolution.error +
-             (view_.circles ? view_.scale_m * view_.m->revolution.error : 0.0);
+             (view_.circles ? view_.scale_m * view_.mate_error : 0.0);
   }
 
   bool run(PolytopeResult* result) {
     const Vec3 e = view_.sign * result->bracket.direction;
     best_ = -result->bracket.lower;
     best_e_ = e;
-    if (!(best_ > tolerance_) || !(view_.across(e).norm() > kLeastRingSine) || !query(e)) return false;
+    if (!(best_ > tolerance_) || !query(e)) return false;
     choose_mate(e);
     on_k_ = last_k_;
     on_m_ = last_m_;
@@ -230,12 +247,23 @@ class RingSearch {
   bool by_circle(const Sector& sector) const { return std::min(sector.low.s, sector.high.s) > view_.tilt; }
   double turned(double half, double r) const { return 2 * view_.tilt * half * r; }
 
+  // |e x b| for e at an angle in the half plane of u, and the point of M's unit circle that faces e. From
+  // cross products: 1 - (e.b)^2 would lose the digits where the axes are nearly one.
+  struct Facing {
+    double sine;
+    Vec3 point;
+  };
+  Facing facing(const Angle& at, const Vec3& u) const {
+    const Vec3 cross = (at.s * u + at.c * view_.axis).cross(view_.mate_axis);
+    const double sine = cross.norm();
+    return {sine, view_.mate_axis.cross(cross) / sine};
+  }
+
   // Of all circles for azimuths within `half` of the sector's.
   void project(const Sector& sector, double half) {
     const double phi = sector.phi;
     const Vec3 u = outward(phi), left = outward(phi - half), right = outward(phi + half);
     const double least_sine = std::min(sector.low.s, sector.high.s);
-    const double cb = view_.axis.dot(view_.mate_axis), bu = view_.circles ? view_.mate_axis.dot(u) : 0.0;
     for (int i = 0; i < count_; ++i) {
       const Circle& c = circle_[i];
       const Vec3 k = view_.across(c.k);
@@ -248,10 +276,10 @@ class RingSearch {
       }
       meridian_[i] = {c.r - reach, c.z - view_.axis.dot(c.k)};
       if (!(c.rm > 0)) continue;
-      const double eb = c.at.s * bu + c.at.c * cb, rho = std::sqrt(std::max(0.0, 1 - eb * eb));
-      if (!(rho > kNoDirection)) continue;  // the tangent plane 0
-      meridian_[i].r += c.rm * (c.at.s - eb * bu) / rho;
-      meridian_[i].z += c.rm * (c.at.c - eb * cb) / rho;
+      const Facing m = facing(c.at, u);
+      if (!(m.sine > kNoDirection)) continue;  // the tangent plane 0
+      meridian_[i].r += c.rm * m.point.dot(u);
+      meridian_[i].z += c.rm * m.point.dot(view_.axis);
       if (by_circle(sector)) meridian_[i].r -= turned(half, c.rm) / least_sine;
     }
   }
@@ -264,6 +292,51 @@ class RingSearch {
                                     4 * kRoundoff * pair_.reach);
     least.value -= turned + noise_;
     return least;
+  }
+
+  // Of one circle, or of two so weighted that nothing is to be gained by another angle: what they say of
+  // (alpha, phi) near (at, sector.phi), to second order. With F = r |e x a| + z e.a + rho |e x b| - e.k, e of
+  // the sector's angles and azimuths:
+  //     F >= q cos(dalpha) + t sin(dalpha) + (f + g dalpha) dphi - bend dphi^2 / 2,  |g| <= twist,
+  // since |e x b| is convex along the meridian, and by Taylor's theorem along the azimuth. The greatest of
+  // all circles is no less, and what it says of the azimuth to first order cancels at the minimum.
+  double second_order(const Sector& sector, const Least& here) const {
+    const Vec3 u = outward(sector.phi), across = view_.axis.cross(u);
+    const double c = here.at.c, s = here.at.s;
+    // Of M's circle: |e x b|, at least this, and what it changes by with the azimuth.
+    const double least_sine = std::min(sector.low.s, sector.high.s);
+    Facing m{1, Vec3::Zero()};
+    double least = 1, turned = 0;
+    if (view_.circles) {
+      m = facing(here.at, u);
+      least = least_sine * view_.axis.dot(view_.mate_axis) - view_.tilt;
+      turned = s * m.point.dot(across);
+      if (!(least > 0.5 * least_sine)) return -kFarAway;
+    }
+    struct Slope {
+      double q, t, f;
+    };
+    const auto slope = [&](const Circle& circle) {
+      const double ps = circle.r - circle.k.dot(u) + circle.rm * m.point.dot(u),
+                   pc = circle.z - circle.k.dot(view_.axis) + circle.rm * m.point.dot(view_.axis),
+                   f = circle.rm * turned - s * circle.k.dot(across);
+      return Slope{ps * s + pc * c, ps * c - pc * s, f};
+    };
+    const Circle &one = circle_[here.from], &two = circle_[here.to];
+    const Slope x = slope(one), y = slope(two);
+    const double share = x.t * y.t < 0 ? y.t / (y.t - x.t) : x.q > y.q ? 1.0 : 0.0;
+    const double q = share * x.q + (1 - share) * y.q, t = share * x.t + (1 - share) * y.t,
+                 f = share * x.f + (1 - share) * y.f, rho = share * one.rm + (1 - share) * two.rm;
+    const Vec3 k = view_.across(share * one.k + (1 - share) * two.k);
+    const double inverse = 1 / least;
+    const double bend = k.norm() + rho * view_.tilt * (1 + view_.tilt * inverse * inverse) * inverse,
+                 twist = std::abs(k.dot(across)) + rho * view_.tilt * (2 + inverse * inverse) * inverse;
+    // A chord is shorter than its angle by less than a twentieth up to a radian.
+    const auto away = [&](const Angle& a) { return 1.05 * std::hypot(a.c - c, a.s - s); };
+    const double h = sector.half, turn = std::max(away(sector.low), away(sector.high));
+    if (!(turn < 1 && q > 0)) return -kFarAway;
+    return q * (1 - 0.5 * turn * turn) - std::abs(t) * turn - (std::abs(f) + twist * turn) * h -
+           0.5 * bend * h * h - noise_;
   }
 
   bool close(double phi) {
@@ -281,10 +354,17 @@ class RingSearch {
         --top;
         continue;
       }
+      proven_ = std::min(proven_, threshold);  // of the angles now left out
       sector.low = wide.low;
       sector.high = wide.high;
       const Least here = bound(sector, 0, threshold);
       if (here.value >= best_ - kMeridianShare * tolerance_) {
+        const double second = second_order(sector, here);
+        if (second >= threshold) {
+          proven_ = std::min(proven_, second);
+          --top;
+          continue;
+        }
         if (top > kDeepestSector) return false;
         const double half = 0.5 * sector.half;
         const Sector other{sector.phi + half, half, sector.low, sector.high};

@@ -197,6 +197,68 @@ TEST(Revolution, tips_on_one_axis_are_resolved) {
   }
 }
 
+// Deep, on axes a hair apart: rings of directions that overlap by nearly the same, least somewhere on them.
+// The work is counted in supports asked for, not timed.
+TEST(Revolution, rings_about_axes_that_nearly_meet_are_closed) {
+  Random random(61);
+  std::vector<Solid> solids = {test::cone(random, 0.7, 1.2),       test::double_cone(random, 1, 0.4, 0.9),
+                               test::double_cone(random, 1, 1, 1), test::cylinder(random, 0.8, 0.5),
+                               test::cylinder(random, 0.2, 1),     test::frustum(random, 0.4, 0.9, 1)};
+  for (const Vec3& axes : {Vec3(1, 0.01, 0.01), Vec3(1, 1, 1)}) {
+    solids.push_back(test::ellipsoid_solid(axes));
+    solids.back().normals = {Vec3::UnitX()};
+  }
+  const int count = static_cast<int>(solids.size());
+  int deep = 0;
+  for (int k = 0; k < 400; ++k) {
+    const Solid &sa = solids[random.below(count)], &sb = solids[random.below(count)];
+    if (sa.shape->proofs.sphere && sb.shape->proofs.sphere) continue;
+    const double scale = random.below(2) ? 1 : random.log_uniform(0.3, 3);
+    Particle a{sa.shape.get(), 1, Vec3::Zero(), random.turn()},
+        b{sb.shape.get(), scale, Vec3::Zero(), random.turn()};
+    const Vec3 axis = a.q * sa.normals[0];
+    const Quat tilt = random.turn_by(random.log_uniform(1e-9, 0.1));
+    b.q = (tilt * Quat::FromTwoVectors(b.q * sb.normals[0], random.sign() * axis) * b.q).normalized();
+    const double size = std::min(sa.shape->bounding_radius, b.scale * sb.shape->bounding_radius);
+    const auto support_a = [&](const Vec3& d) -> Vec3 { return a.q * sa.support(a.q.conjugate() * d); };
+    const auto support_b = [&](const Vec3& d) -> Vec3 {
+      return b.scale * (b.q * sb.support(b.q.conjugate() * d));
+    };
+    const double along = axis.dot(support_a(axis) - support_b(-axis)) - size * random.uniform(0, 1.5);
+    const double off = size * random.log_uniform(1e-9, 0.1);
+    b.x = along * axis + off * random.direction();
+    const auto overlap = [&](const Vec3& d) {
+      return d.dot(support_a(d)) - d.dot(support_b(-d)) - d.dot(b.x);
+    };
+    double memory[kPairMemorySize] = {0};
+    const ContactResult r = find_contact(a, b, ContactSettings(), memory);
+    const std::string name = sa.shape->name + ", " + sb.shape->name + ", pair " + std::to_string(k);
+    ASSERT_EQ(r.status, Status::converged) << name << ", width " << r.upper - r.lower;
+    EXPECT_LE(r.iterations, 300) << name;
+    ASSERT_NEAR(overlap(r.normal), -r.gap, 2e-9 * size) << name;
+    deep += r.gap < -0.1 * size;
+    double least = 1e300;
+    Vec3 best = r.normal;
+    for (int i = 0; i < 300; ++i) {
+      Vec3 d =
+          i % 3 ? Vec3(Quat(Eigen::AngleAxisd(random.uniform(0, 6.3), axis)) * r.normal) : random.direction();
+      const double aside = i % 3 == 1 ? random.log_uniform(1e-7, 1e-1) : 0;
+      d = (d + aside * random.direction()).normalized();
+      const double p = overlap(d);
+      if (p < least) least = p, best = d;
+    }
+    double stride = 0.03;
+    for (int moves = 0; stride > 1e-11 && moves < 300; ++moves) {  // a compass that turns at random
+      const Vec3 d = (best + stride * best.cross(random.direction()).normalized()).normalized();
+      const double p = overlap(d);
+      stride *= p < least ? 1.5 : 0.85;
+      if (p < least) least = p, best = d;
+    }
+    ASSERT_GE(least, -r.upper - 1e-13) << name << ": by " << -r.upper - least;
+  }
+  EXPECT_GT(deep, 200);
+}
+
 // --- saved cases
 // -------------------------------------------------------------------------------------------
 
