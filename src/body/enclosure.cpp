@@ -262,28 +262,24 @@ Range eigenvalues(const FormMatrix& m) {
   return {std::max(mean - split - change, circles), mean + split + change};
 }
 
-// Unit tangent of least curvature where the tangents are tu and tv, unit normal n: the remainders of entries
-// of W that differ much do not mix in a basis of it.
-Vec3 principal_direction(const Vec3& tu, const Vec3& tv, const FormMatrix& form, const Vec3& n) {
-  const Vec3 t = n.unitOrthogonal(), s = n.cross(t);
-  const double e = form.a.c, f = form.b.c, g = form.c.c;
-  const double tx = t.dot(tu), ty = t.dot(tv), sx = s.dot(tu), sy = s.dot(tv);
-  // J adj(D) J'.
-  const double a = g * tx * tx - 2 * f * tx * ty + e * ty * ty,
-               c = g * sx * sx - 2 * f * sx * sy + e * sy * sy,
-               b = g * tx * sx - f * (tx * sy + ty * sx) + e * ty * sy;
-  const double angle = 0.5 * std::atan2(2 * b, a - c);
-  return std::cos(angle) * t + std::sin(angle) * s;
-}
-
-// Of W in a basis that is principal in the middle: 2 |w12 x y| <= |w12| (k x^2 + y^2 / k).
-Stretch stretch_of(const FormMatrix& w, const Vec3& along) {
+// In a basis that is principal in the middle, so that the remainders of entries that differ much do not mix:
+// jt and `w` are the tangents and W in that of `axes`; 2 |w12 x y| <= |w12| (k x^2 + y^2 / k).
+Stretch stretch_of(const AffineForm (&jt)[2][2], const FormMatrix& form, const AffineForm& factor,
+                   const FormMatrix& w, const Mat3& axes) {
   Stretch s;
-  if (!(w.a.c > 0 && w.c.c > 0)) return s;
-  const double k = std::sqrt(w.a.c / w.c.c), mixed = w.b.most();
-  s.along = along;
-  s.most = std::max(0.0, w.a.low() - k * mixed);
-  s.least = std::max(0.0, std::min(s.most, w.c.low() - mixed / k));
+  const double angle = 0.5 * std::atan2(2 * w.b.c, w.a.c - w.c.c), x = std::cos(angle), y = std::sin(angle);
+  const AffineForm t[2][2] = {{x * jt[0][0] + y * jt[1][0], x * jt[0][1] + y * jt[1][1]},
+                              {x * jt[1][0] - y * jt[0][0], x * jt[1][1] - y * jt[0][1]}};
+  const auto entry = [&](int k, int l) {
+    return factor * ((form.c * t[k][0] - form.b * t[k][1]) * t[l][0] +
+                     (form.a * t[k][1] - form.b * t[k][0]) * t[l][1]);
+  };
+  const AffineForm most = entry(0, 0), mixed = entry(0, 1), least = entry(1, 1);
+  if (!(most.c > 0 && least.c > 0)) return s;
+  const double k = std::sqrt(most.c / least.c);
+  s.along = x * axes.col(0) + y * axes.col(1);
+  s.most = std::max(0.0, most.low() - k * mixed.most());
+  s.least = std::max(0.0, std::min(s.most, least.low() - mixed.most() / k));
   return s;
 }
 
@@ -466,8 +462,7 @@ CellBounds enclose_in_frame(const BezierPatch& patch, const Cell& cell, bool wit
   Mat3 axes;
   axes.col(2) = (frame.to.transpose() * normal.center()).normalized();
   if (!axes.col(2).allFinite() || axes.col(2).norm() < 0.5) return out;
-  axes.col(0) = principal_direction(frame.back * tangent_u.center(), frame.back * tangent_v.center(), form,
-                                    axes.col(2));
+  axes.col(0) = axes.col(2).unitOrthogonal();
   axes.col(1) = axes.col(2).cross(axes.col(0));
   const Mat3 back = axes.transpose() * frame.back;
   const AffineVector m = (frame.to * axes).transpose() * normal;  // N over det
@@ -528,9 +523,8 @@ CellBounds enclose_in_frame(const BezierPatch& patch, const Cell& cell, bool wit
   out.max_radius = std::min(out.max_radius, radii.high);
   const double shortest2 = length.low() * length.low();
   const double product = shortest2 * shortest2 / det.high() * frame.det * frame.det;
-  out.stretch = stretch_of(w, axes.col(0));
-  out.min_radius =
-      std::max({out.min_radius, radii.low * upright2, out.stretch.least * upright2, product / radii.high});
+  out.min_radius = std::max({out.min_radius, radii.low * upright2, product / radii.high});
+  out.stretch = stretch_of(jt, form, factor, w, axes);
   if (!rated) return out;
   out.seen_rate = rate_at(patch, cell.u0 + 0.5 * cell.du, cell.v0 + 0.5 * cell.dv);
 

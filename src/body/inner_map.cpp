@@ -62,6 +62,10 @@ float or_none(float x) {
 float threshold(double angle) {
   return angle < M_PI ? static_cast<float>(std::cos(angle) - kCosineRoundoff) : -2;
 }
+// Of W, for unit tangents of the leaf.
+double upright_least(const CellBounds& b) {
+  return b.stretch.least * std::cos(b.cone) * std::cos(b.cone);
+}
 // Four patches meet in a corner: no two normals there are further apart than their kinks together.
 double widest_kink(const Shape& shape) {
   return kGapsCrossed * std::max(shape.proofs.opening, shape.proofs.closing);
@@ -85,7 +89,7 @@ class NodePainter {
       const CellBounds& b = leaf.bounds;
       const double crease = b.regular && kink_at(shape_, leaf.cell) > kNoKink ? widest_kink(shape_) : 0;
       see(b.axis, b.regular ? threshold(b.cone + crease + kInnerCaps.back()) : -2);
-      lower(b.regular ? b.cone : M_PI, b.regular ? down(b.min_radius) : 0);
+      lower(b.regular ? b.cone : M_PI, b.regular ? down(std::max(b.min_radius, upright_least(b))) : 0);
       if (crease > 0) lower(b.cone + crease, 0);
     }
     const double all = shape_.joints.none() ? shape_.patch_curvature.min_radius : 0;
@@ -139,8 +143,7 @@ class StretchPainter {
   void paint(const std::vector<Leaf>& leaves) {
     for (const Leaf& leaf : leaves) {
       const CellBounds& b = leaf.bounds;
-      const double upright = std::cos(b.cone);
-      lower(b, b.cone, b.regular ? down(b.stretch.least * upright * upright) : 0, true);
+      lower(b, b.cone, b.regular ? down(upright_least(b)) : 0, true);
       if (b.regular && kink_at(shape_, leaf.cell) > kNoKink) lower(b, b.cone + widest_kink(shape_), 0, false);
     }
     begin();
