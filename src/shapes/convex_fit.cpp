@@ -20,9 +20,8 @@ constexpr double kFirstPenalty = 10, kPenaltyGrowth = 6;
 constexpr double kCalm = 0.3;       // share of its weight that a sample without error keeps
 constexpr double kMostAsked = 0.3;  // curvature
 constexpr double kCutSlope = 1.2;   // distance of a corner cut off over that of the surface below it, about
-constexpr double kSlide =
-    0.05;  // distance from its ray that costs a point as much as an error of the tolerance
-constexpr double kHopeless = 5;  // times the tolerance after kHopeRounds rounds: given up
+constexpr int kRaises = 5;          // of the least curvature, by a factor of two
+constexpr double kHopeless = 5;     // times the tolerance after kHopeRounds rounds: given up
 constexpr int kHopeRounds = 5;
 constexpr double kSpeed2 = 2.5;            // squared speed of the parameters, about
 constexpr double kRegular = 1e-9;          // of the conditions' block of the matrix
@@ -337,7 +336,7 @@ class Fitter {
   // Keeps the parametrisation near that by rays from the origin, and the net smooth.
   double add_order(const Local& f, const Shares& s, const Vec3& ray, double share, double damping,
                    Sums* sums) {
-    const double hold = share / (kSlide * kSlide);
+    const double hold = share / (options_.slide * options_.slide);
     const Vec3 aside = f.x - ray * ray.dot(f.x);
     if (sums) {
       sums->load += hold * s.col(0) * aside.transpose();
@@ -511,6 +510,18 @@ ConvexFit fit_convex(const SmoothCube& cube, const NetPoints& start, const Offse
                      const ConvexFitOptions& options) {
   ConvexFit fit = Fitter(cube, target, options).run(start);
   tidy(cube, fit.points);
+  return fit;
+}
+
+ConvexFit raise_curvature(const SmoothCube& cube, ConvexFit fit, const OffsetTarget& target,
+                          ConvexFitOptions options, const std::function<bool(const ConvexFit&)>& accept) {
+  for (int k = 0; k < kRaises; ++k) {
+    options.least_curvature *= 2;
+    ConvexFit raised = fit_convex(cube, fit.points, target, options);
+    if (raised.error > options.tolerance || raised.least_curvature <= fit.least_curvature) break;
+    if (!accept(raised)) break;
+    fit = std::move(raised);
+  }
   return fit;
 }
 

@@ -21,6 +21,7 @@ struct ConvexFitOptions {
   double most_curvature = 100;    // wanted, as far as the other aims allow
   double tolerance = 0.01;        // length: the fit stops when it is met at the samples
   double cut_weight = 1.5;        // of errors where the fit is inside: a corner cut off is farther than faces
+  double slide = 0.05;  // distance from its ray that costs a point as much as an error of the tolerance
   Mat3 metric = Mat3::Identity();  // support errors count over |metric n|: those of the body mapped by the
                                    // transposed inverse of `metric`
 };
@@ -40,6 +41,12 @@ struct ConvexFit {
 // hundred points.
 ConvexFit fit_convex(const SmoothCube& cube, const NetPoints& start, const OffsetTarget& target,
                      const ConvexFitOptions& options);
+
+// Asks a fit that met its tolerance for twice the least curvature, and again, as long as the tolerance is
+// met, `accept` takes the result and its least curvature grows: the flattest places bulge by what the
+// tolerance leaves, which contacts on them are the cheaper for. Returns the last that was accepted.
+ConvexFit raise_curvature(const SmoothCube& cube, ConvexFit fit, const OffsetTarget& target,
+                          ConvexFitOptions options, const std::function<bool(const ConvexFit&)>& accept);
 
 // The net of smooth joints nearest, in the mean square, to points given over faces and their parameters in
 // [0, 1]^2.

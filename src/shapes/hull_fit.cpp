@@ -27,6 +27,9 @@ constexpr double kSurelyTooCoarse = 3;  // times the tolerance: the next rung is
 // A fit that aims at far less than it can reach weighs distances so heavily that it loses convexity: the aim
 // falls from kFirstAim (of the radius) with what has been reached.
 constexpr double kFirstAim = 0.06, kAimShare = 0.6;
+// Distance from its ray that costs a point as much as an error of the tolerance: free too early, the points
+// crowd.
+constexpr double kFirstSlide = 0.05, kFreeSlide = 0.15;
 constexpr size_t kMostFaces = 60;  // of a polyhedron with rounded edges ...
 constexpr int kRoundings = 2;      // ... whose radius is found by the distance of the first one
 constexpr int kClosestSteps = 40;
@@ -269,6 +272,12 @@ class HullFitter {
       if (fit.error > aim || aim <= tolerance_) break;
       aim = std::max(tolerance_, kAimShare * fit.error);
     }
+    ConvexFitOptions free = aimed_at(tolerance_);
+    free.slide = kFreeSlide;
+    if (fit.error > tolerance_ && fit.error < kSurelyTooCoarse * tolerance_) {
+      ConvexFit freed = fit_convex(cube, fit.points, offset, free);
+      if (freed.error < fit.error) fit = std::move(freed);
+    }
     const double reached = fit.error / radius_;
     const std::string kind = std::string(degree == 3 ? "bicubic" : "biquartic") + ", " +
                              std::to_string(spans) + " x " + std::to_string(spans) + " spans, " +
@@ -278,14 +287,22 @@ class HullFitter {
       if (fit.error < kFar) least_ = std::min(least_, reached);
       return false;
     }
-    std::vector<NurbsSurface> body = cube.surfaces(fit.points);
-    transform(body, frame_.from, frame_.center);
-    return judge(std::move(body), kind);
+    bool accepted = false;
+    const auto accept = [&](const ConvexFit& found) {
+      std::vector<NurbsSurface> body = cube.surfaces(found.points);
+      transform(body, frame_.from, frame_.center);
+      const bool good = judge(std::move(body), kind);
+      accepted = accepted || good;
+      return good;
+    };
+    if (accept(fit) || fit.error <= tolerance_) raise_curvature(cube, fit, offset, free, accept);
+    return accepted;
   }
 
   ConvexFitOptions aimed_at(double aim) const {
     ConvexFitOptions options;
     options.tolerance = 0.97 * aim;
+    options.slide = kFirstSlide;
     options.least_curvature =
         std::clamp(kCurvatureShare * options.tolerance, kLeastCurvature, kMostCurvature);
     options.most_curvature = 1 / options.tolerance;
@@ -312,7 +329,10 @@ class HullFitter {
     }
     now.distance = hull_distance(*now.shape, hull_, 0.01 * tolerance_);
     const double error = now.distance.worst() / radius_;
-    say(kind + ": within " + percent(error));
+    char radii[64];
+    std::snprintf(radii, sizeof radii, ", curvature radius up to %.3g",
+                  now.shape->patch_curvature.max_radius);
+    say(kind + ": within " + percent(error) + radii);
     least_ = std::min(least_, error);
     if (error > options_.tolerance) return false;
     best_ = std::move(now);

@@ -25,6 +25,7 @@
 #include "shapes/random_pebble.h"
 #include "shapes/revolved.h"
 #include "shapes/rounded_polyhedron.h"
+#include "shapes/superellipsoid.h"
 #include "tools/command.h"
 
 namespace {
@@ -35,7 +36,7 @@ using Surfaces = std::vector<NurbsSurface>;
 constexpr char kExamples[] =
     "Examples:\n"
     "  nurbs-shape make ellipsoid --axes 0.012,0.008,0.006 -o ellipsoid.json\n"
-    "  nurbs-shape make superellipsoid --axes 1,1,2 --exponent 4 --spans 5 blocky.json\n"
+    "  nurbs-shape make superellipsoid --axes 1,1,2 --exponent 4 --tolerance 0.1% -o blocky.json\n"
     "  nurbs-shape make inertia --inertia 1.0,0.9,0.8,-0.04,0.02,0.09 --mass 2 stone.json\n"
     "  nurbs-shape fit grain.stl --tolerance 2% -o grain.json\n"
     "  nurbs-shape import part.step --unit m -o part.json\n"
@@ -242,12 +243,22 @@ Body make_smooth(const Options& options) {
   return {std::move(surfaces), fit_note(error)};
 }
 
+constexpr double kFinestSuperellipsoid = 1e-4;
+
 Body make_superellipsoid(const Options& options) {
-  double error = 0;
   const Vec3 axes = options.axes();
   const double exponent = options.numbers("--exponent", 1, 2, 12)[0];
-  Surfaces surfaces = fitted_superellipsoid(axes, exponent, options.spans(3), &error);
-  return {std::move(surfaces), fit_note(error)};
+  if (options.has("--spans")) {
+    if (options.has("--tolerance")) options.fail("--spans and --tolerance exclude each other");
+    double error = 0;
+    Surfaces surfaces = fitted_superellipsoid(axes, exponent, options.spans(3), &error);
+    return {std::move(surfaces), fit_note(error)};
+  }
+  const std::string text = options.has("--tolerance") ? options.text("--tolerance") : "0.2%";
+  const double tolerance = parse_share("make superellipsoid: --tolerance", text, 0.05);
+  if (tolerance < kFinestSuperellipsoid) options.fail("--tolerance is " + text + ", must be 0.01% at least");
+  Superellipsoid body = convex_superellipsoid(axes, exponent, tolerance);
+  return {std::move(body.surfaces), fit_note(body.error)};
 }
 
 // A share in [lo, 1], or a range of them "LO,HI".
@@ -435,11 +446,13 @@ const std::vector<Maker>& makers() {
         {"--rounding", "R", "radius of edges and corners; faces stay where they are"}},
        make_rounded_polyhedron},
       {"superellipsoid",
-       "|x/A|^E + |y/B|^E + |z/C|^E = 1, fitted",
+       "|x/A|^E + |y/B|^E + |z/C|^E = 1, fitted: strictly convex, joints smooth",
        {kAxes,
         {"--exponent", "E", "2 to 12"},
+        {"--tolerance", "T",
+         "share of the largest semi-axis, as 0.2%, the default: flat faces bulge by up to this"},
         {"--spans", "N",
-         "of a patch in each direction, 1 to 12, default 3: odd numbers dent flat faces less"}},
+         "instead, 1 to 12: bicubic, of N x N spans a patch, faces flat and slightly dented, joints kinked"}},
        make_superellipsoid},
       {"revolved",
        "exact ellipsoid, one rational patch, axis z",
