@@ -64,7 +64,7 @@ SHAPES = {  # arguments of nurbs-shape make
     "sphere": ["sphere"],
     "ellipsoid": ["ellipsoid", "--axes", "1,1.5,2"],
     "pebble": ["pebble"],
-    "blocky": ["superellipsoid", "--axes", "1,1,1", "--exponent", "4", "--spans", "5"],
+    "blocky": ["superellipsoid", "--axes", "1,1,1", "--exponent", "4"],
 }
 CASES = {  # name: (deck, shape of the bed)
     "sphere": ("sphere", "sphere"),

@@ -209,6 +209,7 @@ class HullFitter {
       if (degree == 4 && start_error_ < kFar && start_error_ > kSurelyTooCoarse * tolerance_) continue;
       if (try_rung(degree, spans, target)) return best_;
     }
+    if (best_.shape) return best_;  // its convexity is measured, not proven
     throw ShapeError("no body of up to 1736 control points is within the tolerance of " +
                      percent(options_.tolerance) + " of the hull; the best is within " + percent(least_) +
                      ": raise the tolerance");
@@ -310,7 +311,8 @@ class HullFitter {
     return options;
   }
 
-  // Whether a body loads without a dent and is near enough; keeps it then.
+  // Whether a body loads without a dent, is near enough and proven convex, with a ball that rolls inside:
+  // keeps it then, and the first one for which that can't be proven, whose contacts are dear.
   bool judge(std::vector<NurbsSurface> surfaces, const std::string& kind) {
     HullFit now;
     now.surfaces = std::move(surfaces);
@@ -335,8 +337,9 @@ class HullFitter {
     say(kind + ": within " + percent(error) + radii);
     least_ = std::min(least_, error);
     if (error > options_.tolerance) return false;
-    best_ = std::move(now);
-    return true;
+    const bool proven = now.shape->proofs.convex && now.shape->patch_curvature.min_radius > 0;
+    if (proven || !best_.shape) best_ = std::move(now);
+    return proven;
   }
 
   void say(const std::string& line) const {

@@ -38,8 +38,10 @@ struct HullFit {
 };
 
 // The first of: an exact sphere; bicubic and biquartic bodies of smooth joints on six patches of growing
-// numbers of spans, whose certified distance is within the tolerance and which load without a dent. Throws
-// ShapeError when none is, naming the best that was reached.
+// numbers of spans, whose certified distance is within the tolerance, which load without a dent and are
+// proven convex; of that many spans then the one of the largest least curvature found. Where none is proven
+// convex, the first that is within the tolerance. Throws ShapeError when there is none, naming the best that
+// was reached.
 HullFit fit_hull(const ConvexHull& hull, const HullFitOptions& options);
 
 }  // namespace nurbs

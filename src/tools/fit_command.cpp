@@ -237,7 +237,9 @@ constexpr char kFitNotes[] =
     "4, 6, 8\n"
     "spans whose largest distance from the hull, either way, is proven to be within the tolerance, a share "
     "of the\n"
-    "hull's largest radius about its centre of mass.\n"
+    "hull's largest radius about its centre of mass, and which is proven convex where one is; its flattest "
+    "places bulge\n"
+    "by what the tolerance leaves, which keeps contacts cheap.\n"
     "Example: nurbs-shape fit grain.stl --tolerance 2% -o grain.json\n";
 
 }  // namespace

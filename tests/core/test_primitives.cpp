@@ -6,11 +6,13 @@
 #include <functional>
 
 #include "body/local_form.h"
+#include "body/proofs.h"
 #include "body/shape.h"
 #include "body/support.h"
 #include "io/shape_file.h"
 #include "nurbs/affine.h"
 #include "shapes/primitives.h"
+#include "shapes/superellipsoid.h"
 #include "support/random.h"
 
 namespace nurbs {
@@ -257,6 +259,31 @@ TEST(Superellipsoid, staysWithinItsStatedErrorAndConvex) {
     const auto shape = make_shape("superellipsoid", body);
     EXPECT_LT(shape->concavity, 1e-3 * shape->bounding_radius) << e;
   }
+}
+
+// Against the exact support function, (sum |a_k d_k|^q)^(1/q) with 1/q + 1/e = 1: the largest difference of
+// the supports of two convex bodies is their Hausdorff distance.
+TEST(Superellipsoid, convexOnesAreWithinTheirStatedErrorAndProvenStrictlyConvex) {
+  const Vec3 axes(1, 0.8, 1.5);
+  Random random(2);
+  for (const auto& [e, tolerance] : {std::pair{2.5, 2e-3}, {4.0, 2e-3}, {4.0, 5e-4}}) {
+    const Superellipsoid body = convex_superellipsoid(axes, e, tolerance);
+    expect_closed_exactly(body.surfaces);
+    EXPECT_LE(body.error, tolerance * 1.5) << e;
+    std::vector<std::string> warnings;
+    const auto shape = make_shape("blocky", body.surfaces, std::nullopt, &warnings);
+    EXPECT_TRUE(warnings.empty()) << e;
+    EXPECT_TRUE(shape->smooth && proven_without_dents(*shape)) << e;
+    EXPECT_LT(shape->patch_curvature.max_radius, 1e4) << e;
+    const double q = e / (e - 1);
+    for (int k = 0; k < 4000; ++k) {
+      const Vec3 d = random.direction();
+      const double exact = std::pow(d.cwiseProduct(axes).array().abs().pow(q).sum(), 1 / q);
+      EXPECT_NEAR(find_support(*shape, d).h + d.dot(shape->mass.center), exact, 1.05 * body.error) << e;
+    }
+  }
+  EXPECT_THROW(convex_superellipsoid(axes, 12, 2e-4), ShapeError);
+  EXPECT_LT(largest(convex_superellipsoid(Vec3::Ones(), 2, 1e-3).surfaces, off_unit_sphere), 1e-14);
 }
 
 TEST(Superellipsoid, ofExponentTwoIsAnEllipsoid) {

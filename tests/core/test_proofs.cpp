@@ -178,7 +178,7 @@ TEST(Radii, see_a_spike_between_all_samples) {
 // Nearly flat faces, curvature radii to a hundred times the body's size, joints that open by 0.3 degrees: all
 // of it is proven, so that no contact needs the hull to confirm it.
 TEST(Radii, of_nearly_flat_faces_are_proven) {
-  const ShapePointer s = read_shape_file("examples/shapes/blocky.json");
+  const ShapePointer s = make_shape("blocky", fitted_superellipsoid({1, 1, 1}, 4, 5));
   EXPECT_TRUE(s->proofs.convex);
   EXPECT_GE(s->patch_curvature.min_radius, s->proofs.seen_min / 1.2);
   EXPECT_LE(s->patch_curvature.max_radius, 4 * s->proofs.seen_max);
@@ -202,7 +202,7 @@ TEST(Radii, of_nearly_flat_faces_are_proven) {
 // along themselves for ever leaves without any bound. With no ball known that rolls inside, every contact
 // took the fallback: a hundred times as long.
 TEST(Radii, of_fitted_grains_are_proven) {
-  for (const char* file : {"examples/shapes/sand_grain.json", "examples/shapes/asteroid.json"}) {
+  for (const char* file : {"tests/cases/shape-bent-strips.json", "examples/shapes/asteroid.json"}) {
     const ShapePointer s = read_shape_file(file);
     EXPECT_TRUE(s->proofs.convex) << file;
     EXPECT_TRUE(proven_without_dents(*s)) << file;

@@ -145,6 +145,17 @@ class Fit(unittest.TestCase):
         self.assertLess(outward, bounds[0] / 100 * radius * 1.001)  # a bound is one
         self.assertLess(-inward, bounds[1] / 100 * radius * 1.001)
 
+    def test_fine_fits_are_smooth(self):
+        """Nearer than a mesh's facets are flat: strictly convex all the same, so that contacts stay cheap."""
+        points, faces = meshes.grain(2, 3, rough=0.15, axes=(1.3, 1.0, 0.8))
+        said = self.fit(points, faces, "--tolerance", "0.7%")
+        self.assert_near(points, 0.007)
+        least, most = map(float, re.search(r"; curvature radius (\S+) to (\S+)\n", said).groups())
+        self.assertGreater(least, 0.02)
+        self.assertLess(most, 200)
+        self.assertIn("proven: no dents", call("check", self.out).stdout)
+        self.assertIn("strictly convex", call("info", self.out).stdout)
+
     def test_every_kind_of_file_is_one_mesh(self):
         points, faces = meshes.grain(4, 2)
         turned = faces.copy()

@@ -42,8 +42,9 @@ class Library(unittest.TestCase):
             check = subprocess.run([str(deck.BUILD / "nurbs-shape"), "check", str(file)], stdout=subprocess.PIPE,
                                    stderr=subprocess.PIPE, text=True)
             self.assertEqual(check.returncode, 0, check.stderr)
-            if file.stem != "blocky":  # made before fits were convex: dented by less than a thousandth
-                self.assertEqual(check.stderr, "")
+            self.assertEqual(check.stderr, "")
+            if file.stem != "tablet":  # where its flat faces meet the rim one curvature falls to zero
+                self.assertIn("proven: no dents", check.stdout.replace("not proven", ""))
             self.assertLess(file.stat().st_size, 70000)
 
     def test_bed_of_fitted_bodies(self):
