@@ -23,6 +23,7 @@ constexpr int kLadder[][2] = {{3, 1}, {4, 1}, {3, 2}, {4, 2}, {3, 3}, {4, 3},
                               {3, 4}, {4, 4}, {3, 6}, {4, 6}, {3, 8}};
 constexpr double kCurvatureShare = 3;  // least curvature over the tolerance, both relative
 constexpr double kLeastCurvature = 0.002, kMostCurvature = 0.1;
+constexpr int kFurther = 2;  // rungs tried beyond a body that is near enough, but not proven convex
 constexpr double kSurelyTooCoarse = 3;  // times the tolerance: the next rung is skipped
 // A fit that aims at far less than it can reach weighs distances so heavily that it loses convexity: the aim
 // falls from kFirstAim (of the radius) with what has been reached.
@@ -203,11 +204,13 @@ class HullFitter {
     std::vector<Vec3> even;
     for (const Vec3& p : hull_.mesh().points) even.emplace_back(frame_.to * (p - frame_.center));
     const RayTarget target{ConvexHull(even)};
+    int further = 0;
     for (const auto& [degree, spans] : kLadder) {
       if (options_.spans > 0 && spans != options_.spans) continue;
       if (spans > 1 && options_.spans == 0 && try_polyhedron()) return best_;
       if (degree == 4 && start_error_ < kFar && start_error_ > kSurelyTooCoarse * tolerance_) continue;
       if (try_rung(degree, spans, target)) return best_;
+      if (best_.shape && further++ == kFurther) break;
     }
     if (best_.shape) return best_;  // its convexity is measured, not proven
     throw ShapeError("no body of up to 1736 control points is within the tolerance of " +

@@ -147,12 +147,12 @@ class Fit(unittest.TestCase):
 
     def test_fine_fits_are_smooth(self):
         """Nearer than a mesh's facets are flat: strictly convex all the same, so that contacts stay cheap."""
-        points, faces = meshes.grain(2, 3, rough=0.15, axes=(1.3, 1.0, 0.8))
-        said = self.fit(points, faces, "--tolerance", "0.7%")
-        self.assert_near(points, 0.007)
+        points, faces = meshes.grain(2, 4, rough=0.15, axes=(1.3, 1.0, 0.8))
+        said = self.fit(points, faces, "--tolerance", "1%")
+        self.assert_near(points, 0.01)
         least, most = map(float, re.search(r"; curvature radius (\S+) to (\S+)\n", said).groups())
         self.assertGreater(least, 0.02)
-        self.assertLess(most, 200)
+        self.assertLess(most, 50)
         self.assertIn("proven: no dents", call("check", self.out).stdout)
         self.assertIn("strictly convex", call("info", self.out).stdout)
 
