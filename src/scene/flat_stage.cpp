@@ -49,14 +49,6 @@ void take_over(const ContactCoefficients& law, const ContactGeometry& g, const B
   for (int k = 0; k < 3; ++k) state->tangential_force[k] = -law.kt * state->spring[k];
 }
 
-namespace {
-
-bool rests(const ContactState& state) {
-  return state.active == 0 || std::abs(state.rate) * state.dt < kResting * state.overlap;
-}
-
-}  // namespace
-
 bool ContactStages::may_be_flat(int a, int b) const {
   if (a < -1) return partners_[-2 - a].region != nullptr && step_.settings.solver == Solver::ladder;
   return record(b).flat != 0 && (a < 0 || record(a).flat != 0) && step_.settings.solver == Solver::ladder;
@@ -191,13 +183,17 @@ void ContactStages::relax_factor(const ContactBlock& block, int lane, FlatContac
       coefficients(block, lane);  // zeros where a model serves, which books itself
   const double before = flat.polygon.factor;
   double tangential = 0;  // energy at factor 1
+  double phase = 1;
   for (int k = 0; k < state.count; ++k) {
     ContactState point;
     flat.points.get(k, kStateField, kContactStateSize, &point);
-    if (!rests(point)) return;
+    if (point.active == 0) continue;
+    const ContactRest rest = rest_of(point, record(block.a[lane]), record(block.b[lane]));
+    if (!rest.rests) return;
+    phase = std::min(phase, rest.phase);
     tangential += flat.polygon.weight[k] * stored_energy(law, point).tangential_spring;
   }
-  double energy = law.kn * relax(flat.polygon, state, kRelaxation);
+  double energy = law.kn * relax(flat.polygon, state, kRelaxation * phase);
   energy += (flat.polygon.factor - before) * tangential;
   book(-energy, block.a[lane], block.b[lane]);
 }
@@ -335,8 +331,9 @@ void ContactStages::relax_weight(ContactBlock& block, int lane, double gap) {
   }
   ContactState state;
   block.get(lane, kStateField, kContactStateSize, &state);
-  if (!rests(state) || (weight < 1 && step_.model != nullptr)) return;
-  const double change = kRelaxation * (1 - weight);
+  const ContactRest rest = rest_of(state, record(block.a[lane]), record(block.b[lane]));
+  if (!rest.rests || (weight < 1 && step_.model != nullptr)) return;
+  const double change = kRelaxation * rest.phase * (1 - weight);
   weight += change;
   if (step_.model != nullptr) return;  // what its springs give up is missing at the next step's balance
   const ContactCoefficients& law = step_.laws[block.law[lane]];

@@ -24,10 +24,6 @@ constexpr double kSamePlane = 1e-9;  // of normals, and of the bounding radius: 
 constexpr double kArrival = 1.1;     // ways of a step that a contact which begins at its surface is deep
 constexpr std::uint64_t kPiece = 7;  // bits of a name that say plane, edge or vertex; planes are 0
 
-bool rests(const ContactState& state) {
-  return state.active != 0 && std::abs(state.rate) * state.dt < kResting * state.overlap;
-}
-
 }  // namespace
 
 // Of a contact of weight 1.
@@ -272,22 +268,28 @@ void ContactStages::balance_found(int body, WallContact* found, const std::int32
 void ContactStages::stand_closer(std::int32_t number, int body, const ContactGeometry& g) {
   Partner& p = partner(number);
   if (p.shift == 0) return;
-  const double way = kRelaxation * p.shift;
   const ContactBlock& block = pool_.block(number);
   const int lane = ContactPool::lane(number);
-  double energy = 0;
+  double energy = 0, way = 0;
   if (FlatContact* flat = pool_.flat(number)) {
+    double phase = 1;
     for (int k = 0; k < flat->polygon.count; ++k) {
       ContactState state;
       flat->points.get(k, kStateField, kContactStateSize, &state);
-      if (state.active != 0 && !rests(state)) return;
+      if (state.active == 0) continue;
+      const ContactRest rest = rest_of(state, p.record, record(body));
+      if (!rest.rests) return;
+      phase = std::min(phase, rest.phase);
     }
+    way = kRelaxation * phase * p.shift;
     energy = polygon_energy(number, body, -way) - polygon_energy(number, body, 0);
     flat->polygon.offset += way;
   } else {
     ContactState state;
     block.get(lane, kStateField, kContactStateSize, &state);
-    if (!rests(state)) return;
+    const ContactRest rest = rest_of(state, p.record, record(body));
+    if (!rest.rests) return;
+    way = kRelaxation * rest.phase * p.shift;
     ContactGeometry before = g, after = g;
     before.overlap -= p.shift;
     after.overlap -= p.shift - way;

@@ -2,19 +2,41 @@
 // their own stiffness.
 #pragma once
 
+#include <algorithm>
+#include <cmath>
+
 #include "scene/contact_stages.h"
 
 namespace nurbs {
 
-// Of its distance to 1 that a factor moves in a step, and of a wall's shift: a corner that has come down flat
-// is up to four times too stiff, and the spring energy that it gives up is booked. Contacts wait for it until
-// they rest: what raising a factor puts in is booked too, and is then no more than the springs hold under the
-// bodies' weight.
-constexpr double kRelaxation = 2e-3;
-constexpr double kResting = 1e-4;  // of its overlap that a contact at rest moves along the normal in a step
+// Of its distance to 1 that a factor moves in a radian of the contact's own oscillation, and of a wall's
+// shift: a corner that has come down flat is up to four times too stiff, and the spring energy that it gives
+// up is booked. Contacts wait for it until they rest: what raising a factor puts in is booked too, and is
+// then no more than the springs hold under the bodies' weight.
+constexpr double kRelaxation = 0.1;
+// Of the speed and the acceleration of an oscillation as wide as its overlap, that a contact at rest has:
+// small against both, whatever the time step. One that turns back in a bounce has the acceleration.
+constexpr double kResting = 0.02;
 constexpr double kStiffest = 8;    // factor or weight of a contact; four is what a corner needs
 constexpr double kSoftest = 1e-3;  // weight of one whose polygon held nothing over its part of a mesh's
                                    // plane, beside which the body's deepest point may lie
+
+// How a contact moves beside its own oscillation, whose frequency is the root of force over overlap and
+// reduced mass (by the sum of the inverse masses): by the last step's rate and this one's.
+struct ContactRest {
+  double phase = 0;  // of the oscillation in a step, rad, at most 1
+  bool rests = false;
+};
+inline ContactRest rest_of(const ContactState& s, const BodyRecord& a, const BodyRecord& b) {
+  ContactRest r;
+  if (!(s.active != 0 && s.overlap > 0 && s.normal_force > 0)) return r;
+  r.phase = std::min(1.0, s.dt * std::sqrt(s.normal_force / s.overlap * (a.inverse_mass + b.inverse_mass)));
+  const Vec3 now = load(b.velocity) + load(b.spin).cross(load(s.arm_b)) - load(a.velocity) -
+                   load(a.spin).cross(load(s.arm_a));
+  const double wide = kResting * s.overlap * r.phase, change = -now.dot(load(s.normal)) - s.rate;
+  r.rests = std::abs(s.rate) * s.dt <= wide && std::abs(change) * s.dt <= wide * r.phase;
+  return r;
+}
 
 // A contact of a body in the balance.
 struct ContactStages::Holding {

@@ -171,6 +171,15 @@ class Heap(unittest.TestCase):
         print(f"    undamped boxes: ledger off by {np.ptp(ledger) / ledger[0]:.1e} of the energy", flush=True)
         self.assertLess(np.ptp(ledger), 2e-3 * ledger[0])
 
+    def test_a_bounce_keeps_its_energy_at_any_time_step(self):
+        """A contact that turns back is none at rest, however little it moves in a fine step: its weights stay."""
+        for degrees, dt in ((10, 5e-5), (10, 2e-6), (33, 2e-6)):
+            r = run([atom(1, (0.1, 0.2, 0.9), turned((1, 0.2, -0.1), degrees))], round(0.6 / dt), law="kn 2e7 kt 1e7 mu 0",
+                    every=round(6e-3 / dt), dt=dt)
+            ledger, damping = r.thermo["ledger"], r.thermo["led[3]"]
+            self.assertLess(np.abs(damping).max(), 1e-9 * ledger[0], (degrees, dt))
+            self.assertLess(np.ptp(ledger), 1e-4 * ledger[0], (degrees, dt))
+
 
 class Statics(unittest.TestCase):
     def test_tips_at_the_angle_of_statics(self):
