@@ -41,6 +41,11 @@ PairGranNurbs* FixContactHistoryNurbs::pair() const {
   return dynamic_cast<PairGranNurbs*>(force->pair);
 }
 
+void FixContactHistoryNurbs::post_run() {
+  FixContactHistory::post_run();
+  if (serves_nurbs()) pair()->end_run();
+}
+
 nurbs::ContactPool& FixContactHistoryNurbs::pool() const {
   return pair()->stages().pool();
 }

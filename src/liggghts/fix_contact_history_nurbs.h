@@ -25,6 +25,7 @@ class FixContactHistoryNurbs : public FixContactHistory {
   void init() override;
   void pre_exchange() override;
   void setup_pre_exchange() override;
+  void post_run() override;
   int pack_exchange(int i, double* buffer) override;
   int unpack_exchange(int i, double* buffer) override;
   void write_restart(FILE* file) override;

@@ -429,6 +429,7 @@ void FixWallNurbs::post_force(int) {
   step.owned = atom->nlocal;
   step.dt = update->dt;
   step.setup = update->setupflag != 0;
+  step.changed = pair != nullptr && pair->changed();
   step.ledger = ledger_;
   step.settings = settings_;
   step.laws = &law_;

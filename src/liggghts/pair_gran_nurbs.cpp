@@ -11,6 +11,7 @@
 #include "domain.h"
 #include "error.h"
 #include "fix_contact_property_atom.h"
+#include "fix_property_global.h"
 #include "force.h"
 #include "io/pair_case.h"
 #include "liggghts/fix_contact_history_nurbs.h"
@@ -235,6 +236,42 @@ void PairGranNurbs::hand_in_neighbours() {
   stages_.end_neighbours();
 }
 
+// Of all ranks: motion and mass of every body, in whatever order, and what contacts are computed with.
+// Positions are not in it, which wrap; contacts see themselves whether bodies have been moved.
+std::uint64_t PairGranNurbs::fingerprint() const {
+  const auto add = [](double value, std::uint64_t* to) {
+    std::uint64_t bits;
+    value += 0.0;  // -0 is 0
+    std::memcpy(&bits, &value, sizeof bits);
+    *to = nurbs::mix(*to + bits);
+  };
+  std::uint64_t mine = 0, all = 0, rest = 1;
+  for (int i = 0; i < atom->nlocal; ++i) {
+    std::uint64_t body = static_cast<std::uint64_t>(atom->tag[i]);
+    for (int k = 0; k < 3; ++k) {
+      add(atom->v[i][k], &body);
+      add(atom->omega[i][k], &body);
+    }
+    add(atom->rmass[i], &body);
+    add(atom->mask[i] & freeze_group_bit_, &body);
+    mine += body;
+  }
+  MPI_Allreduce(&mine, &all, 1, MPI_UINT64_T, MPI_SUM, world);
+  for (const nurbs::ContactCoefficients& law : law_table_)
+    for (const double value : {law.kn, law.kt, law.cn, law.ct, law.mu}) add(value, &rest);
+  for (int k = 0; k < modify->nfix; ++k)
+    if (auto* property = dynamic_cast<FixPropertyGlobal*>(modify->fix[k])) {
+      for (int n = 0; n < property->size_vector; ++n) add(property->compute_vector(n), &rest);
+      for (int n = 0; n < property->size_array_rows; ++n)
+        for (int m = 0; m < property->size_array_cols; ++m) add(property->compute_array(n, m), &rest);
+    }
+  return nurbs::mix(all + rest) | 1;
+}
+
+void PairGranNurbs::end_run() {
+  fingerprint_ = fingerprint();
+}
+
 void PairGranNurbs::compute_force(int eflag, int vflag, int addflag) {
   if (addflag) return report_contacts();
   if (eflag || vflag)
@@ -252,6 +289,8 @@ void PairGranNurbs::compute_force(int eflag, int vflag, int addflag) {
   step.owned = atom->nlocal;
   step.dt = update->dt;
   step.setup = shearupdate_ == 0;
+  changed_ = step.setup && fingerprint_ != 0 && fingerprint() != fingerprint_;
+  step.changed = changed_;
   step.ledger = ledger_;
   step.settings = settings_;
   step.types = atom->type;

@@ -14,6 +14,7 @@ PairStyle(gran/nurbs,PairGranNurbs)
 #ifndef LMP_PAIR_GRAN_NURBS_H
 #define LMP_PAIR_GRAN_NURBS_H
 
+#include <cstdint>
 #include <memory>
 #include <optional>
 #include <string>
@@ -67,6 +68,12 @@ class PairGranNurbs : public PairGran {
   // The contacts themselves, for fix contacthistory, which carries them across ranks and restarts.
   nurbs::ContactStages& stages() { return stages_; }
 
+  // For fix contacthistory, at the end of a run, and for walls: whether somebody has changed since then how
+  // bodies move or what they are made of, so that forces at the start of the next run are not those of the
+  // end of the last. Collective.
+  void end_run();
+  bool changed() const { return changed_; }
+
   double memory_usage() override { return static_cast<double>(stages_.bytes() + bodies_->bodies().bytes()); }
 
  protected:
@@ -87,6 +94,7 @@ class PairGranNurbs : public PairGran {
   void recall_images(int i);
   void warn_time_step();
 
+  std::uint64_t fingerprint() const;
   void hand_in_neighbours();
   void add_forces();
   void keep_case();
@@ -103,6 +111,8 @@ class PairGranNurbs : public PairGran {
   AtomVecNurbs* bodies_ = nullptr;
   nurbs::ContactStages stages_;
   bool ledger_ = false;
+  std::uint64_t fingerprint_ = 0;  // at the end of the last run, 0 before the first
+  bool changed_ = false;
   bigint checked_particles_ = 0;  // when the time step was last checked
   std::string last_warning_, last_deep_warning_;
 };

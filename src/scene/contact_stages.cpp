@@ -14,6 +14,8 @@ namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr int kUnique = kLocalModelSize - 1;
+constexpr double kSamePose =
+    1e-6;  // of the smaller radius: bodies that a new run finds nearer were not moved
 constexpr double kBudgetShare = 1 - 1e-12;  // of a proven gap: sums of paths are rounded
 
 // Numbers `field` ... of the contacts `first` to first + kWidth - 1 of a block.
@@ -496,9 +498,9 @@ void ContactStages::start_run(ContactBlock& block, int lane, const Results& resu
   const ContactCoefficients law = coefficients(block, lane);
   if (results.touching[lane] != 0) {
     block.get(lane, kStateField, kContactStateSize, &state);
-    const double same = 10 * step_.settings.tolerance * smaller_radius(a, b) +
+    const double same = std::min(10 * step_.settings.tolerance, kSamePose) * smaller_radius(a, b) +
                         1e-13 * (results.offset_of(lane).norm() + load(record(a).x).norm());
-    const bool goes_on = state.dt > 0 && same_geometry(state, geometry, same);
+    const bool goes_on = !step_.changed && state.dt > 0 && same_geometry(state, geometry, same);
     if (step_.model != nullptr) {
       if (goes_on)
         load_model(block, lane, state);

@@ -79,8 +79,9 @@ class ContactStages {
     const Bodies* bodies = nullptr;
     int owned = 0;  // bodies from here on are ghosts: they get no force, and their contacts count half
     double dt = 0;
-    bool setup = false;   // forces before the first step of a run: nothing may move on
-    bool ledger = false;  // count what is dissipated
+    bool setup = false;    // forces before the first step of a run: nothing may move on
+    bool changed = false;  // with setup: forces are not those of the step before, if there was one
+    bool ledger = false;   // count what is dissipated
     ContactSettings settings;
     // Laws by types of bodies: number types[a] * type_count + types[b]; without types number 0.
     const int* types = nullptr;

@@ -88,6 +88,57 @@ def reference():
     return deck.run_ok(scene(), files=files())
 
 
+class NewRun(unittest.TestCase):
+    def test_a_run_begins_with_what_was_changed(self):
+        """Forces at the start of a run are those of the velocities, coefficients and places as they are then, and where
+        nothing was changed those of the end of the last run."""
+        deck_text = """
+units si
+newton off
+atom_modify map array
+communicate single vel yes
+atom_style nurbs sphere.json
+boundary f f f
+region box block -5 5 -5 5 -5 5 units box
+create_box 1 box
+create_atoms 1 single 0 0 0 units box
+create_atoms 1 single 1.98 0 0 units box
+set group all density 1000
+group b id 2
+neighbor 0.3 bin
+neigh_modify delay 0
+pair_style gran/nurbs tolerance 1e-4
+pair_coeff * * kn 1e5 kt 5e4 cn 1e3 mu 0.5
+fix motion all nve/nurbs
+timestep 1e-6
+variable fx equal fx[2]
+thermo_style custom step v_fx
+thermo_modify format float %.12g
+run 1
+velocity b set -1 0 0 units box
+run 0
+velocity b set 1 0 0 units box
+run 0
+velocity all set 0 0 0 units box
+pair_coeff * * kn 2e5 kt 5e4 cn 1e3 mu 0.5
+run 0
+displace_atoms b move -3e-4 0 0 units box
+run 0
+displace_atoms b move -3e-4 0 0 units box
+run 1
+run 0
+"""
+        result = deck.run_ok(deck_text, files=files())
+        forces = [float(line.split()[1]) for line in result.screen.splitlines()
+                  if len(line.split()) == 2 and line.split()[0] in ("0", "1", "2")]
+        expected = [2000, None, 3000, 1000, 4000, 4060, 4120, None]
+        self.assertEqual(len(forces), 9)
+        for got, wanted in zip(forces, expected):
+            if wanted:
+                self.assertAlmostEqual(got, wanted, delta=0.1)
+        self.assertEqual(forces[-1], forces[-2])
+
+
 class Ledger(unittest.TestCase):
 
     def test_energy_and_dissipation_add_up(self):
