@@ -21,6 +21,7 @@ namespace nurbs {
 namespace {
 
 constexpr double kSamePlane = 1e-9;  // of normals, and of the bounding radius: two planes are one
+constexpr double kSameWay = 0.01;    // of a wall's way in a step by which its plane may be elsewhere
 constexpr double kArrival = 1.1;     // ways of a step that a contact which begins at its surface is deep
 constexpr std::uint64_t kPiece = 7;  // bits of a name that say plane, edge or vertex; planes are 0
 
@@ -105,9 +106,19 @@ bool ContactStages::same_piece(std::int32_t number, int body, const WallContact&
   Vec3 normal = load(state.normal);
   if (const double flat = block.field[kFlat][lane])
     normal = load(pool_.flats()[static_cast<int>(flat) - 1].polygon.normal);
+  // The plane as it was, or where the wall's motion has brought it since.
+  const Vec3 x = load(p.record.x), velocity = found.velocity + found.spin.cross(x - found.result.point_a);
   const Vec3& now = found.result.normal;
-  return (normal - now).norm() < kSamePlane &&
-         std::abs(now.dot(found.result.point_a) - p.level) < kSamePlane * record(body).radius;
+  const double radius = record(body).radius, level = now.dot(found.result.point_a);
+  for (const double dt : {0.0, step_.dt}) {
+    const double turned = dt * found.spin.norm(), way = dt * velocity.norm();
+    const Vec3 moved = (normal + dt * found.spin.cross(normal)).normalized();
+    const double moved_level = moved.dot(x + dt * velocity) + p.level - normal.dot(x);
+    if ((moved - now).norm() < kSamePlane + turned * turned &&
+        std::abs(level - moved_level) < (kSamePlane + turned * turned) * radius + kSameWay * way)
+      return true;
+  }
+  return false;
 }
 
 // Whether a contact's overlap is another one than the body's motion can have made of the last.

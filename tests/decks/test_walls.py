@@ -269,7 +269,48 @@ class BentMeshes(unittest.TestCase):
         self.assertGreater(frames(out)[-1, 0, 2], 0.012)
 
 
+RISING = """
+units si
+newton off
+communicate single vel yes
+atom_style nurbs cube.json
+boundary f f f
+region box block -4 4 -4 4 -5 10 units box
+create_box 1 box
+create_atoms 1 single 0.1 0.23 -0.2 units box
+set group all nurbs/scale 0.7 density 100
+set group all quat 1 0.2 -0.1 33
+neighbor {skin} bin
+neigh_modify delay 0
+pair_style gran/nurbs
+pair_coeff * * {law}
+fix m all mesh/surface file floor.stl type 1
+fix mv all move/mesh mesh m {motion}
+fix floor all wall/nurbs mesh m {law}
+fix gravity all gravity 9.81 vector 0 0 -1
+fix motion all nve/nurbs
+timestep 1e-4
+compute ke all ke
+compute er all erotate/nurbs
+thermo 1000
+thermo_style custom step c_ke c_er
+thermo_modify norm no format float %.12g
+run 8500
+"""
+
+
 class MovingWalls(unittest.TestCase):
+    def test_a_flat_face_stays_on_a_plane_that_moves_whatever_its_triangles(self):
+        """Which of its triangles are near a body changes with the neighbour lists; it is the same plane still."""
+        for motion in ("linear 0 0 0.5", "wiggle amplitude 0 0 0.05 period 0.2", "rotate origin 0 0 -1.5 axis 1 0 0 period 20"):
+            ends = []
+            for cells, skin in ((1, 0.3), (3, 0.3), (3, 1e-2)):
+                floor = [tuple((x, y, z - 1.5) for x, y, z in triangle) for triangle in sheet(cells, 3.2)]
+                out = deck.run_ok(RISING.format(motion=motion, skin=skin, law="kn 1e5 kt 5e4 cn 20 mu 0.4"),
+                                  files={"cube.json": deck.shape_file("box", 1, 1, 1), "floor.stl": stl(floor)})
+                ends.append((out.thermo["ke"][-1], out.thermo["er"][-1]))
+            np.testing.assert_allclose(ends[1:], [ends[0]] * 2, rtol=2e-5)
+
     BALL = [(1, 1, 1, 0.03, 2500.0, 0.0, 0.0, 0.031, 0.9, 0.3, 0.1, 0.2)]
 
     def test_what_counts_is_the_relative_motion(self):
