@@ -15,6 +15,8 @@ ComputeNurbsEnergy::ComputeNurbsEnergy(LAMMPS* lmp, int& iarg, int narg, char** 
   if (iarg < narg)
     nurbs_host::fail_all(FLERR, lmp, std::string("Compute nurbs/energy: unknown keyword ") + arg[iarg]);
   AtomVecNurbs::require(lmp, "Compute nurbs/energy");
+  if (igroup != 0)
+    nurbs_host::warn(FLERR, lmp, "Compute nurbs/energy: it counts all contacts, whatever its group");
   vector_flag = 1;
   size_vector = 4;
   extvector = 1;
