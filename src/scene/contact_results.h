@@ -17,6 +17,17 @@ inline BodyMotion motion_of(const BodyRecord& r) {
   return m;
 }
 
+// Of B relative to A at a contact point.
+inline Vec3 velocity_at(const BodyRecord& a, const BodyRecord& b, const Vec3& spin_a, const Vec3& spin_b,
+                        const Vec3& arm_a, const Vec3& arm_b) {
+  return load(b.velocity) + spin_b.cross(arm_b) - load(a.velocity) - spin_a.cross(arm_a);
+}
+
+// Of the two contact points.
+inline Vec3 middle_of(const ContactResult& r) {
+  return 0.5 * (r.point_a + r.point_b);
+}
+
 // The state of a contact that takes over from others: their spring, and no dissipation to be finished.
 void take_over(const ContactCoefficients& law, const ContactGeometry& g, const BodyMotion& a,
                const BodyMotion& b, double dt, const Vec3& spring, ContactState* state);
@@ -32,7 +43,7 @@ struct alignas(64) ContactStages::Results {
     gap[lane] = r.gap;
     lower[lane] = r.lower;
     touching[lane] = touches(r);
-    const Vec3 middle = 0.5 * (r.point_a + r.point_b);
+    const Vec3 middle = middle_of(r);
     for (int k = 0; k < 3; ++k) {
       normal[k][lane] = r.normal[k];
       point[k][lane] = middle[k];

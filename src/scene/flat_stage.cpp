@@ -181,19 +181,16 @@ void ContactStages::relax_factor(const ContactBlock& block, int lane, FlatContac
                                  const PolygonState& state) {
   const ContactCoefficients law =
       coefficients(block, lane);  // zeros where a model serves, which books itself
+  const ContactRest rest = rest_of(flat, state.count, record(block.a[lane]), record(block.b[lane]));
+  if (!rest.rests) return;
   const double before = flat.polygon.factor;
   double tangential = 0;  // energy at factor 1
-  double phase = 1;
   for (int k = 0; k < state.count; ++k) {
     ContactState point;
     flat.points.get(k, kStateField, kContactStateSize, &point);
-    if (point.active == 0) continue;
-    const ContactRest rest = rest_of(point, record(block.a[lane]), record(block.b[lane]));
-    if (!rest.rests) return;
-    phase = std::min(phase, rest.phase);
     tangential += flat.polygon.weight[k] * stored_energy(law, point).tangential_spring;
   }
-  double energy = law.kn * relax(flat.polygon, state, kRelaxation * phase);
+  double energy = law.kn * relax(flat.polygon, state, kRelaxation * rest.phase);
   energy += (flat.polygon.factor - before) * tangential;
   book(-energy, block.a[lane], block.b[lane]);
 }

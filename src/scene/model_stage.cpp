@@ -28,12 +28,6 @@ constexpr double kFrozenPhase = 5 * kTurn;   // of a contact whose spheres stay
 constexpr double kRelaxedPhase = 5 * kTurn;  // in which older ones come to 1 / e of their way ...
 constexpr double kStride = kTurn / 8;        // ... by small steps, so that few steps evaluate surfaces
 
-// Of B relative to A at a contact point.
-Vec3 velocity_at(const BodyRecord& a, const BodyRecord& b, const Vec3& spin_a, const Vec3& spin_b,
-                 const Vec3& arm_a, const Vec3& arm_b) {
-  return load(b.velocity) + spin_b.cross(arm_b) - load(a.velocity) - spin_a.cross(arm_a);
-}
-
 double volume_curvature(const Particle& p) {
   return std::cbrt(2 * kTurn / (3 * p.shape->mass.volume)) / p.scale;  // (4 pi / 3 V)^(1/3)
 }

@@ -235,7 +235,7 @@ void ContactStages::balance_found(int body, WallContact* found, const std::int32
     h.number = number[k];
     h.negative = f.weight < 0;
     if (h.negative) block.field[kWeight][lane] = f.weight;
-    const Vec3 middle = 0.5 * (f.result.point_a + f.result.point_b);
+    const Vec3 middle = middle_of(f.result);
     h.geometry = {-f.result.gap, f.result.normal, middle - load(p.record.x), middle - load(b.x)};
     FlatContact* flat = pool_.flat(number[k]);
     h.begins = !known[k] || !same_piece(number[k], body, f) || jumps(number[k], body, f);
@@ -283,16 +283,9 @@ void ContactStages::stand_closer(std::int32_t number, int body, const ContactGeo
   const int lane = ContactPool::lane(number);
   double energy = 0, way = 0;
   if (FlatContact* flat = pool_.flat(number)) {
-    double phase = 1;
-    for (int k = 0; k < flat->polygon.count; ++k) {
-      ContactState state;
-      flat->points.get(k, kStateField, kContactStateSize, &state);
-      if (state.active == 0) continue;
-      const ContactRest rest = rest_of(state, p.record, record(body));
-      if (!rest.rests) return;
-      phase = std::min(phase, rest.phase);
-    }
-    way = kRelaxation * phase * p.shift;
+    const ContactRest rest = rest_of(*flat, flat->polygon.count, p.record, record(body));
+    if (!rest.rests) return;
+    way = kRelaxation * rest.phase * p.shift;
     energy = polygon_energy(number, body, -way) - polygon_energy(number, body, 0);
     flat->polygon.offset += way;
   } else {

@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "scene/contact_stages.h"
+#include "scene/contact_results.h"
 
 namespace nurbs {
 
@@ -31,11 +31,22 @@ inline ContactRest rest_of(const ContactState& s, const BodyRecord& a, const Bod
   ContactRest r;
   if (!(s.active != 0 && s.overlap > 0 && s.normal_force > 0)) return r;
   r.phase = std::min(1.0, s.dt * std::sqrt(s.normal_force / s.overlap * (a.inverse_mass + b.inverse_mass)));
-  const Vec3 now = load(b.velocity) + load(b.spin).cross(load(s.arm_b)) - load(a.velocity) -
-                   load(a.spin).cross(load(s.arm_a));
+  const Vec3 now = velocity_at(a, b, load(a.spin), load(b.spin), load(s.arm_a), load(s.arm_b));
   const double wide = kResting * s.overlap * r.phase, change = -now.dot(load(s.normal)) - s.rate;
   r.rests = std::abs(s.rate) * s.dt <= wide && std::abs(change) * s.dt <= wide * r.phase;
   return r;
+}
+// Of the first `count` points of a polygon: all of those that bear rest, and the slowest one's phase.
+inline ContactRest rest_of(const FlatContact& flat, int count, const BodyRecord& a, const BodyRecord& b) {
+  ContactRest all{1, true};
+  for (int k = 0; k < count && all.rests; ++k) {
+    ContactState point;
+    flat.points.get(k, kStateField, kContactStateSize, &point);
+    if (point.active == 0) continue;
+    const ContactRest one = rest_of(point, a, b);
+    all = {std::min(all.phase, one.phase), one.rests};
+  }
+  return all;
 }
 
 // A contact of a body in the balance.

@@ -123,14 +123,6 @@ int ContactStages::list_former(int body, std::int32_t head, Former* former) {
   return count;
 }
 
-namespace {
-
-Vec3 middle_of(const ContactResult& r) {
-  return 0.5 * (r.point_a + r.point_b);
-}
-
-}  // namespace
-
 // Which former contact each of those found goes on with: on the same piece of the wall, then nearest first.
 // `number` of those that go on with none stays 0.
 void ContactStages::pair_up(int body, Former* former, int formers, const WallContact* found, int count,
