@@ -23,6 +23,20 @@ inline CubePoint to_cube(const Vec3& d) {
   return {2 * k + (d[k] < 0), major, d[k1] / major, d[k2] / major};
 }
 
+// The way back, of length 1 / major.
+inline Vec3 from_cube(int face, double a, double b) {
+  const int k = face / 2;
+  Vec3 d;
+  d[k] = face % 2 ? -1 : 1;
+  d[(k + 1) % 3] = a;
+  d[(k + 2) % 3] = b;
+  return d;
+}
+// Through the middle of cell (i, j) of a face; not unit.
+inline Vec3 cell_middle(int face, int i, int j, int cells) {
+  return from_cube(face, (2.0 * i + 1) / cells - 1, (2.0 * j + 1) / cells - 1);
+}
+
 // Number of the cell that coordinate a or b lies in, of `cells` along the edge.
 inline int cube_cell(double coordinate, int cells) {
   return std::clamp(static_cast<int>((coordinate + 1) * (0.5 * cells)), 0, cells - 1);

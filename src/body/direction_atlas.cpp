@@ -13,12 +13,7 @@ namespace nurbs {
 Vec3 DirectionAtlas::direction(int node) const {
   const int n = cells + 1;
   const int face = node / (n * n), i = node / n % n, j = node % n;
-  const int k = face / 2;
-  Vec3 d;
-  d[k] = face % 2 ? -1.0 : 1.0;
-  d[(k + 1) % 3] = -1.0 + 2.0 * i / cells;
-  d[(k + 2) % 3] = -1.0 + 2.0 * j / cells;
-  return d;
+  return from_cube(face, -1.0 + 2.0 * i / cells, -1.0 + 2.0 * j / cells);
 }
 
 int DirectionAtlas::nearest(const Vec3& d) const {

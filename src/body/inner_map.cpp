@@ -248,12 +248,7 @@ class StretchPainter {
 
 Vec3 InnerMap::middle(int cell) {
   constexpr int n = kStretchCells;
-  const int face = cell / (n * n), i = cell / n % n, j = cell % n, k = face / 2;
-  Vec3 d;
-  d[k] = face % 2 ? -1 : 1;
-  d[(k + 1) % 3] = (2.0 * i + 1) / n - 1;
-  d[(k + 2) % 3] = (2.0 * j + 1) / n - 1;
-  return d.normalized();
+  return cell_middle(cell / (n * n), cell / n % n, cell % n, n).normalized();
 }
 
 int InnerMap::cell(const Vec3& d) {

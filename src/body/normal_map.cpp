@@ -34,10 +34,7 @@ void paint_wide(const Vec3& center, double angle, double radius, NormalMap& map)
       for (int j = 0; j < map.cells; ++j) {
         float& cell = map.radius[(face * map.cells + i) * map.cells + j];
         if (cell >= value) continue;
-        Vec3 d;
-        d[face / 2] = face % 2 ? -1 : 1;
-        d[(face / 2 + 1) % 3] = (2.0 * i + 1) / map.cells - 1;
-        d[(face / 2 + 2) % 3] = (2.0 * j + 1) / map.cells - 1;
+        const Vec3 d = cell_middle(face, i, j, map.cells);
         if (d.dot(center) >= cosine * d.norm()) cell = value;
       }
 }

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 
+#include "body/cube_map.h"
 #include "nurbs/tolerances.h"
 
 namespace nurbs {
@@ -18,12 +19,7 @@ const std::array<Vec3, kScanCount>& scan_directions() {
     int n = 0;
     for (int face = 0; face < 6; ++face)
       for (int i = 0; i < kScanCells; ++i)
-        for (int j = 0; j < kScanCells; ++j, ++n) {
-          d[n][face / 2] = face % 2 ? -1 : 1;
-          d[n][(face / 2 + 1) % 3] = (2.0 * i + 1) / kScanCells - 1;
-          d[n][(face / 2 + 2) % 3] = (2.0 * j + 1) / kScanCells - 1;
-          d[n].normalize();
-        }
+        for (int j = 0; j < kScanCells; ++j) d[n++] = cell_middle(face, i, j, kScanCells).normalized();
     return d;
   }();
   return directions;
