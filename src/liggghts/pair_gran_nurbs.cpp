@@ -240,10 +240,7 @@ void PairGranNurbs::hand_in_neighbours() {
 // Positions are not in it, which wrap; contacts see themselves whether bodies have been moved.
 std::uint64_t PairGranNurbs::fingerprint() const {
   const auto add = [](double value, std::uint64_t* to) {
-    std::uint64_t bits;
-    value += 0.0;  // -0 is 0
-    std::memcpy(&bits, &value, sizeof bits);
-    *to = nurbs::mix(*to + bits);
+    *to = nurbs::body_stamp(*to, value + 0.0);  // -0 is 0
   };
   std::uint64_t mine = 0, all = 0, rest = 1;
   for (int i = 0; i < atom->nlocal; ++i) {
