@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cstring>
+#include <utility>
 
 #include "atom.h"
 #include "comm.h"
@@ -41,13 +42,51 @@ PairGranNurbs* FixContactHistoryNurbs::pair() const {
   return dynamic_cast<PairGranNurbs*>(force->pair);
 }
 
+// Whoever comes between this run and the next (delete_atoms, another pair_style) finds what is remembered
+// here.
 void FixContactHistoryNurbs::post_run() {
   FixContactHistory::post_run();
-  if (serves_nurbs()) pair()->end_run();
+  if (!serves_nurbs()) return;
+  setup_pre_exchange();
+  pair()->end_run();
 }
 
 nurbs::ContactPool& FixContactHistoryNurbs::pool() const {
   return pair()->stages().pool();
+}
+
+void FixContactHistoryNurbs::bequeath(Legacy legacy) {
+  legacy_ = std::move(legacy);
+  orphaned_ = true;
+  pair_gran_ = nullptr;
+  computeflag_ = nullptr;
+}
+
+FixContactHistoryNurbs::Legacy FixContactHistoryNurbs::inherit() {
+  orphaned_ = false;
+  return std::exchange(legacy_, Legacy{});
+}
+
+void FixContactHistoryNurbs::forget_contacts() {
+  for (int i = 0; i < atom->nlocal; ++i)
+    for (int n = 0; n < npartner_[i]; ++n) proof(i, n).contact = 0;
+}
+
+void FixContactHistoryNurbs::follow_ids(const std::vector<int>& alive, bool compress) {
+  const auto place = [&](int tag) {
+    return static_cast<int>(std::lower_bound(alive.begin(), alive.end(), tag) - alive.begin());
+  };
+  const auto lives = [&](int tag) { return std::binary_search(alive.begin(), alive.end(), tag); };
+  for (int i = 0; i < atom->nlocal; ++i) {
+    int kept = 0;
+    for (int n = 0; n < npartner_[i]; ++n) {
+      const int tag = partner_[i][n];
+      if (!lives(tag)) continue;
+      proof(i, kept) = proof(i, n);
+      partner_[i][kept++] = compress ? place(tag) + 1 : tag;
+    }
+    npartner_[i] = kept;
+  }
 }
 
 // Of particle i and its partner number n.
@@ -56,6 +95,7 @@ nurbs::PairProof& FixContactHistoryNurbs::proof(int i, int n) const {
 }
 
 void FixContactHistoryNurbs::init() {
+  if (orphaned_) return;  // no pair style has come after gran/nurbs
   if (!serves_nurbs()) return FixContactHistory::init();
   const BorrowedName gran(force);
   FixContactHistory::init();
@@ -94,8 +134,9 @@ void FixContactHistoryNurbs::for_each_neighbour(Flag flag) const {
 // The host keeps what has a contact flag. The flag must mean contact to all else, so it is raised for this
 // call only.
 void FixContactHistoryNurbs::pre_exchange() {
+  if (orphaned_) return;
   if (!serves_nurbs()) return FixContactHistory::pre_exchange();
-  int most = 0;
+  if (computeflag_ == nullptr || !*computeflag_) return;  // all is here; the lists may be of other particles
   for_each_neighbour([this](int& flag, double* history) {
     auto& proof = *reinterpret_cast<nurbs::PairProof*>(history);
     if (!pool().holds(proof.contact)) proof.contact = 0;
@@ -103,14 +144,20 @@ void FixContactHistoryNurbs::pre_exchange() {
   });
   FixContactHistory::pre_exchange();
   for_each_neighbour([](int& flag, const double*) { flag &= kTouching; });
+  ask_for_room();
+}
+
+// The host takes the maximum over fixes of what one particle sends; walls send theirs beside this.
+void FixContactHistoryNurbs::ask_for_room() {
+  int most = 0;
   for (int i = 0; i < atom->nlocal; ++i) most = std::max(most, contacts_size(i));
-  // The host takes the maximum over fixes of what one particle sends; walls send theirs beside this.
   for (FixWallNurbs* wall : FixWallNurbs::all(lmp)) most += wall->most_exchanged();
   comm->maxexchange_fix = std::max(comm->maxexchange_fix, (dnum_ + 1) * maxtouch_ + 1 + most);
 }
 
 void FixContactHistoryNurbs::setup_pre_exchange() {
   if (computeflag_ != nullptr && *computeflag_) pre_exchange();
+  if (serves_nurbs()) ask_for_room();
 }
 
 void FixContactHistoryNurbs::recall(int i, int tag, nurbs::PairProof* to) const {

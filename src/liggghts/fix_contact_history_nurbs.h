@@ -1,9 +1,10 @@
 // fix contacthistory, as pair gran/nurbs needs it: the host's own (per-pair history across reneighbouring,
-// ranks and restarts) under the host's name, with five things changed. It finds the pair style under a name
+// ranks and restarts) under the host's name, with six things changed. It finds the pair style under a name
 // other than "gran"; it keeps the history of neighbours that don't touch but have something proven, the
 // PairProof, which is all that the host's history holds, also where the bounding spheres are apart; the
-// contacts of those that touch, which the pair style owns (scene/contact_pool.h), travel behind it; and it
-// carries the dissipated energy. With another pair style it is the host's fix.
+// contacts of those that touch, which the pair style owns (scene/contact_pool.h), travel behind it; it
+// carries the dissipated energy; and it outlives its pair style, for the next `pair_style gran/nurbs` to go
+// on with. With another pair style it is the host's fix.
 #ifdef FIX_CLASS
 
 FixStyle(contacthistory,FixContactHistoryNurbs)
@@ -13,7 +14,12 @@ FixStyle(contacthistory,FixContactHistoryNurbs)
 #ifndef LMP_FIX_CONTACT_HISTORY_NURBS_H
 #define LMP_FIX_CONTACT_HISTORY_NURBS_H
 
+#include <cstdint>
+#include <string>
+#include <vector>
+
 #include "fix_contact_history.h"
+#include "laws/energy_ledger.h"
 #include "scene/contact_pool.h"
 
 namespace LAMMPS_NS {
@@ -41,6 +47,22 @@ class FixContactHistoryNurbs : public FixContactHistory {
   // The same where there may be several images of it: `way`, from the lower tag's centre to the other's.
   void recall(int i, int tag, const nurbs::Vec3& way, nurbs::PairProof* to) const;
 
+  // What a pair style leaves to the next between two runs.
+  struct Legacy {
+    nurbs::ContactPool contacts;
+    nurbs::EnergyLedger dissipated;
+    std::uint64_t fingerprint = 0;
+    std::string models;  // whose contacts they are
+  };
+  void bequeath(Legacy legacy);
+  bool bequeathed() const { return orphaned_; }
+  Legacy inherit();
+  void forget_contacts();
+
+  // `alive`: the IDs of all particles, ascending. What is remembered of others is forgotten; with `compress`
+  // these get their places in the list, from 1, as IDs. Between runs.
+  void follow_ids(const std::vector<int>& alive, bool compress);
+
  protected:
   void allocate_pages() override;
 
@@ -50,9 +72,13 @@ class FixContactHistoryNurbs : public FixContactHistory {
   template <class Flag>
   void for_each_neighbour(Flag flag) const;
 
+  bool orphaned_ = false;  // the pair style is gone
+  Legacy legacy_;
+
   nurbs::PairProof& proof(int i, int n) const;
   nurbs::Vec3 direction(const nurbs::PairProof& proof) const;
   nurbs::ContactPool& pool() const;
+  void ask_for_room();
   int contacts_size(int i) const;
   int put_contacts(int i, double* buffer) const;
   int get_contacts(int i, const double* buffer);

@@ -41,6 +41,34 @@ PairGranNurbs::PairGranNurbs(LAMMPS* lmp) : PairGran(lmp) {
   for (int k = 0; k < nurbs::kProofSize; ++k) add_history_value("nurbs" + std::to_string(k), "0");
 }
 
+// The base class would delete the history.
+PairGranNurbs::~PairGranNurbs() {
+  auto* history = dynamic_cast<FixContactHistoryNurbs*>(fix_history);
+  if (history == nullptr) return;
+  history->bequeath({std::move(stages_.pool()), stages_.dissipated(), fingerprint_, layout()});
+  fix_history = nullptr;
+}
+
+// Of a pair style gran/nurbs before this one.
+void PairGranNurbs::go_on_with_contacts() {
+  auto* history = dynamic_cast<FixContactHistoryNurbs*>(modify->find_fix_style_strict("contacthistory", 0));
+  if (history == nullptr || !history->bequeathed()) return;
+  fix_history = history;
+  FixContactHistoryNurbs::Legacy legacy = history->inherit();
+  stages_.dissipated() = legacy.dissipated;
+  fingerprint_ = legacy.fingerprint;
+  if (legacy.models == layout()) {
+    stages_.pool() = std::move(legacy.contacts);
+    return;
+  }
+  history->forget_contacts();
+  nurbs_host::warn(
+      FLERR, lmp,
+      std::string(kUser) +
+          ": its models are others than those of the pair_style before; all contacts begin anew, "
+          "without their friction springs");
+}
+
 PairGranNurbs* PairGranNurbs::find(LAMMPS* lmp) {
   return dynamic_cast<PairGranNurbs*>(lmp->force->pair);
 }
@@ -77,10 +105,9 @@ void PairGranNurbs::settings(int narg, char** arg) {
 
 // Contacts keep their history if it is of the same models.
 void PairGranNurbs::set_models(std::unique_ptr<nurbs_host::HostModels> models) {
-  const std::string before = models_ ? models_->layout() : "", after = models ? models->layout() : "";
-  const bool same = (models_ != nullptr) == (models != nullptr) && before == after;
+  const std::string before = layout();
   models_ = std::move(models);
-  if (same) return;
+  if (layout() == before) return;
   stages_.pool().clear();
   stages_.pool().set_memory_size(models_ ? nurbs::kModelMemory + models_->history_size() : 0);
 }
@@ -159,6 +186,7 @@ void PairGranNurbs::init_style() {
   require_host_settings();
   require_all_laws();
   warn_of_sphere_values();
+  if (fix_history == nullptr) go_on_with_contacts();
   PairGran::init_style();
   if (dynamic_cast<FixContactHistoryNurbs*>(fix_history) == nullptr)
     fail_all(FLERR, lmp, "Pair gran/nurbs: fix contacthistory is not the NURBS one");
@@ -250,6 +278,7 @@ std::uint64_t PairGranNurbs::fingerprint() const {
       add(atom->omega[i][k], &body);
     }
     add(atom->rmass[i], &body);
+    add(atom->type[i], &body);
     add(atom->mask[i] & freeze_group_bit_, &body);
     mine += body;
   }
@@ -263,10 +292,6 @@ std::uint64_t PairGranNurbs::fingerprint() const {
         for (int m = 0; m < property->size_array_cols; ++m) add(property->compute_array(n, m), &rest);
     }
   return nurbs::mix(all + rest) | 1;
-}
-
-void PairGranNurbs::end_run() {
-  fingerprint_ = fingerprint();
 }
 
 void PairGranNurbs::compute_force(int eflag, int vflag, int addflag) {

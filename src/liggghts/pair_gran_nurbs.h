@@ -29,6 +29,7 @@ namespace LAMMPS_NS {
 class PairGranNurbs : public PairGran {
  public:
   explicit PairGranNurbs(LAMMPS* lmp);
+  ~PairGranNurbs() override;
 
   // The pair style of `lmp`, or nullptr when it is another.
   static PairGranNurbs* find(LAMMPS* lmp);
@@ -70,8 +71,9 @@ class PairGranNurbs : public PairGran {
 
   // For fix contacthistory, at the end of a run, and for walls: whether somebody has changed since then how
   // bodies move or what they are made of, so that forces at the start of the next run are not those of the
-  // end of the last. Collective.
-  void end_run();
+  // end of the last. `as_at_end`: that nobody has yet. Collective.
+  void end_run() { fingerprint_ = fingerprint(); }
+  bool as_at_end() const { return fingerprint_ != 0 && fingerprint() == fingerprint_; }
   bool changed() const { return changed_; }
 
   double memory_usage() override { return static_cast<double>(stages_.bytes() + bodies_->bodies().bytes()); }
@@ -88,6 +90,8 @@ class PairGranNurbs : public PairGran {
   }
   void set_models(std::unique_ptr<nurbs_host::HostModels> models);
   void allocate_laws();
+  std::string layout() const { return models_ ? "model " + models_->layout() : ""; }
+  void go_on_with_contacts();
   void require_host_settings();
   void warn_of_sphere_values();
   void require_all_laws();

@@ -1,6 +1,7 @@
 // See user_commands_nurbs.h.
 #include "liggghts/user_commands_nurbs.h"
 
+#include <algorithm>
 #include <climits>
 #include <cstdio>
 #include <cstring>
@@ -9,15 +10,18 @@
 #include "atom.h"
 #include "comm.h"
 #include "create_atoms.h"
+#include "delete_atoms.h"
 #include "displace_atoms.h"
 #include "domain.h"
 #include "force.h"
 #include "group.h"
 #include "liggghts/atom_vec_nurbs.h"
 #include "liggghts/body_setter.h"
+#include "liggghts/fix_contact_history_nurbs.h"
 #include "liggghts/fix_template_nurbs.h"
 #include "liggghts/host_error.h"
 #include "liggghts/nurbs_contact.h"
+#include "liggghts/pair_gran_nurbs.h"
 #include "modify.h"
 #include "read_dump.h"
 #include "region.h"
@@ -137,6 +141,40 @@ void CreateAtomsNurbs::command(int narg, char** arg) {
   CreateAtoms(lmp).command(static_cast<int>(host.size()), host.data());
   if (model == nullptr) return bodies()->density_wanted();
   for (int i = before; i < atom->nlocal; ++i) model->make(i);
+}
+
+// History goes by IDs. So these are compressed here, in their order, which says which body of a pair is A;
+// the host's own way numbers by place in memory.
+void DeleteAtomsNurbs::command(int narg, char** arg) {
+  if (bodies() == nullptr) return DeleteAtoms(lmp).command(narg, arg);
+  std::vector<char*> words(arg, arg + narg);
+  bool compress = true;
+  for (int k = 2; k + 1 < narg; ++k)
+    if (std::strcmp(arg[k], "compress") == 0) compress = std::strcmp(arg[k + 1], "no") != 0;
+  char keyword[] = "compress", no[] = "no";
+  PairGranNurbs* pair = PairGranNurbs::find(lmp);
+  const bool goes_on = pair != nullptr && pair->as_at_end();
+  words.insert(words.end(), {keyword, no});
+  DeleteAtoms(lmp).command(narg + 2, words.data());
+
+  int mine = atom->nlocal, ranks = comm->nprocs;
+  std::vector<int> counts(ranks), starts(ranks, 0), alive(atom->natoms);
+  MPI_Allgather(&mine, 1, MPI_INT, counts.data(), 1, MPI_INT, world);
+  for (int k = 1; k < ranks; ++k) starts[k] = starts[k - 1] + counts[k - 1];
+  MPI_Allgatherv(atom->tag, mine, MPI_INT, alive.data(), counts.data(), starts.data(), MPI_INT, world);
+  std::sort(alive.begin(), alive.end());
+  if (auto* history =
+          dynamic_cast<FixContactHistoryNurbs*>(modify->find_fix_style_strict("contacthistory", 0)))
+    history->follow_ids(alive, compress);
+  for (int i = 0; i < mine && compress; ++i) {
+    const auto place = std::lower_bound(alive.begin(), alive.end(), atom->tag[i]);
+    atom->tag[i] = 1 + static_cast<int>(place - alive.begin());
+  }
+  if (compress && atom->map_style) {
+    atom->map_init();
+    atom->map_set();
+  }
+  if (goes_on) pair->end_run();  // for those that are left, the next run is one with the last
 }
 
 void ReplicateNurbs::command(int narg, char** arg) {

@@ -5,13 +5,14 @@
 //       [density D] [the host's keywords]
 //   displace_atoms GROUP rotate ...             turns the particles too
 //   create_atoms TYPE ... [template ID]         as fix particletemplate/nurbs ID draws them
+//   delete_atoms ...                            contacts keep their history, whatever IDs become
 //   replicate, read_dump                        are refused: orientation, contacts or count would go wrong
 // The host's make takes the last style of a name, in the order of the files' names: this one's is late.
 #ifdef COMMAND_CLASS
 
 CommandStyle(set, SetNurbs) CommandStyle(displace_atoms, DisplaceAtomsNurbs)
     CommandStyle(create_atoms, CreateAtomsNurbs) CommandStyle(replicate, ReplicateNurbs)
-        CommandStyle(read_dump, ReadDumpNurbs)
+        CommandStyle(read_dump, ReadDumpNurbs) CommandStyle(delete_atoms, DeleteAtomsNurbs)
 
 #else
 
@@ -50,6 +51,12 @@ class DisplaceAtomsNurbs : public UserCommandNurbs {
 };
 
 class CreateAtomsNurbs : public UserCommandNurbs {
+ public:
+  using UserCommandNurbs::UserCommandNurbs;
+  void command(int narg, char** arg);
+};
+
+class DeleteAtomsNurbs : public UserCommandNurbs {
  public:
   using UserCommandNurbs::UserCommandNurbs;
   void command(int narg, char** arg);

@@ -190,6 +190,105 @@ class OtherCommands(unittest.TestCase):
         self.assertEqual(values, [values[0]] * 3)
 
 
+HEAP = """
+units si
+newton off
+communicate single vel yes
+atom_style nurbs box.json ball.json
+atom_modify map array
+boundary f f f
+processors * 1 1
+read_data in.data
+neighbor 0.1 bin
+neigh_modify delay 0
+LAW
+fix floor all wall/nurbs plane 0 0 0 0 0 1 COEFFICIENTS
+fix gravity all gravity 9.81 vector 0.3 0 -1
+fix motion all nve/nurbs
+compute e all nurbs/energy
+thermo_style custom step atoms ke c_e[1] c_e[2] c_e[3] c_e[4]
+thermo_modify norm no format float %.15g
+timestep 1e-4
+run 6000
+{between}
+run 400
+dump d all custom 1000000 dump.txt id x y z vx vy vz omegax omegay omegaz
+dump_modify d first yes sort id format "%d FORMAT"
+run 0
+""".replace("FORMAT", "%.17g " * 9)
+LINEAR = ("pair_style gran/nurbs\npair_coeff * * kn 1e6 kt 5e5 cn 1e3 ct 1e3 mu 0.4", "kn 1e6 kt 5e5 cn 1e3 ct 1e3 mu 0.4")
+MATERIALS = """
+fix m1 all property/global youngsModulus peratomtype 5e6
+fix m2 all property/global poissonsRatio peratomtype 0.3
+fix m3 all property/global coefficientRestitution peratomtypepair 1 0.5
+fix m4 all property/global coefficientFriction peratomtypepair 1 0.4
+"""
+HERTZ = (MATERIALS + "pair_style gran/nurbs model hertz tangential history\npair_coeff * *",
+         "type 1 model hertz tangential history")
+
+
+class BetweenRuns(unittest.TestCase):
+    """Contacts are remembered by IDs, and by the pair style: neither deleting others, which renumbers, nor saying the pair
+    style anew loses a friction spring."""
+    TWO = "group a id 1\ngroup b id 2\ndelete_atoms group a\ndelete_atoms group b\n"
+
+    @staticmethod
+    def heap(between, law, ranks=1):
+        random, atoms = np.random.default_rng(3), []
+        for k, number in enumerate((7, 3, 9, 4, 5, 11, 12, 6, 8, 10)):
+            q = random.normal(size=4)
+            atoms.append((number, 1, 1 + k % 2, 1.0, 1000.0, -1.0 + k % 3, 0.1 * (k % 4), 0.55 + 0.75 * (k // 3),
+                          *map(float, q / np.linalg.norm(q))))
+        atoms += [(1, 1, 2, 0.5, 1000.0, 5.0, 5.0, 6.0, 1.0, 0.0, 0.0, 0.0), (2, 1, 2, 0.5, 1000.0, -5.0, 5.0, 6.0, 1.0, 0.0, 0.0, 0.0)]
+        text = HEAP.replace("LAW", law[0]).replace("COEFFICIENTS", law[1]).format(between=between)
+        return deck.run_ok(text, ranks=ranks, files={
+            "box.json": deck.box_shape(0.5, 0.4, 0.3), "ball.json": deck.shape_file("sphere", 0.4),
+            "in.data": deck.data_file(atoms, box=((-7, 7), (-7, 7), (-1, 7)))})
+
+    def check_same(self, one, other, gone=0):
+        one, other = (run.dump("dump.txt")[-1][1] for run in (one, other))
+        for name in one:
+            if name != "id":
+                np.testing.assert_array_equal(other[name], one[name][gone:], name)
+
+    def test_deleting_others(self):
+        for law in (LINEAR, HERTZ):
+            one = self.heap("", law)
+            self.assertGreater(one.tables[0]["e[2]"][-1], 0)  # some stick
+            for between, gone in (("group a id 1\ndelete_atoms group a compress no", 1), (self.TWO, 2)):
+                for ranks in (1, 2):
+                    other = self.heap(between, law, ranks)
+                    self.check_same(one, other, gone)
+                    self.assertEqual(other.tables[1]["e[2]"][0], one.tables[1]["e[2]"][0])
+                    first = 2 if "no" in between else 1
+                    np.testing.assert_array_equal(other.dump("dump.txt")[-1][1]["id"], np.arange(first, first + 12 - gone))
+
+    def test_a_number_used_again_has_no_past(self):
+        """A new particle in the place of the one deleted, under its number or another."""
+        place = "".join(f"variable {x}9 equal {x}[12]\nvariable {x}0 equal ${{{x}9}}\n" for x in "xyz")
+        delete = "group a id 12\ndelete_atoms group a compress no\n"
+        other, new = "create_atoms 1 single 6 6 6 units box\n", "create_atoms 1 single ${x0} ${y0} ${z0} units box\n"
+        same, another = (self.heap(place + text, LINEAR) for text in (delete + new + other, other + delete + new))
+        self.assertEqual(same.dump("dump.txt")[-1][1]["id"][-2], 12)
+        self.assertGreater(same.tables[0]["e[2]"][-1], 1.01 * same.tables[1]["e[2]"][0])
+        self.assertEqual(same.tables[1]["e[2]"][0], another.tables[1]["e[2]"][0])
+
+    def test_the_pair_style_again(self):
+        for law in (LINEAR, HERTZ):
+            again = law[0][law[0].index("pair_style"):]
+            one = self.heap("", law)
+            for ranks in (1, 2):
+                self.check_same(one, self.heap(again, law, ranks))
+            self.check_same(one, self.heap(again + "\nwrite_restart a.restart", law))
+        one, other = self.heap("", LINEAR), self.heap(LINEAR[0].replace("nurbs\n", "nurbs tolerance 1e-7\n") + "\n" + self.TWO, LINEAR)
+        self.assertAlmostEqual(other.tables[1]["e[2]"][0] / one.tables[1]["e[2]"][0], 1, delta=1e-4)
+
+    def test_another_model_says_that_contacts_begin_anew(self):
+        other = self.heap(MATERIALS + "pair_style gran/nurbs model hertz tangential no_history\npair_coeff * *", LINEAR)
+        self.assertEqual(other.screen.count("all contacts begin anew, without their friction springs"), 1)
+        self.assertNotIn("begin anew", self.heap(LINEAR[0], LINEAR).screen)
+
+
 class Refused(unittest.TestCase):
     def refuse(self, text, *expected, ranks=1):
         run = deck.run(text, ranks=ranks, files=files())
