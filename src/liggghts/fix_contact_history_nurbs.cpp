@@ -168,30 +168,41 @@ void FixContactHistoryNurbs::recall(int i, int tag, nurbs::PairProof* to) const 
     }
 }
 
-// From A to B, of what is remembered; 0 where nothing says it.
-nurbs::Vec3 FixContactHistoryNurbs::direction(const nurbs::PairProof& proof) const {
+// Between the bodies' centres, from A to B, when a contact last touched; false if it did not.
+bool FixContactHistoryNurbs::offset(std::int32_t contact, nurbs::Vec3* apart) const {
   nurbs::ContactPool& contacts = pool();
-  if (contacts.holds(proof.contact)) {
-    double normal[3];
-    const nurbs::FlatContact* flat = contacts.flat(proof.contact);
-    const nurbs::ContactBlock& block = flat ? flat->points : contacts.block(proof.contact);
-    for (int lane = 0; lane < nurbs::kBlock; ++lane) {
-      if (!flat && lane != nurbs::ContactPool::lane(proof.contact)) continue;
-      block.get(lane, nurbs::kStateField + 3, 3, normal);
-      if (nurbs::load(normal).squaredNorm() > 0) return nurbs::load(normal);
-    }
+  if (!contacts.holds(contact)) return false;
+  const nurbs::FlatContact* flat = contacts.flat(contact);
+  const nurbs::ContactBlock& block = flat ? flat->points : contacts.block(contact);
+  for (int lane = 0; lane < nurbs::kBlock; ++lane) {
+    if (flat ? !(block.used >> lane & 1) : lane != nurbs::ContactPool::lane(contact)) continue;
+    nurbs::ContactState state;
+    block.get(lane, nurbs::kStateField, nurbs::kContactStateSize, &state);
+    if (state.active == 0) continue;
+    *apart = nurbs::load(state.arm_a) - nurbs::load(state.arm_b);
+    return true;
   }
-  return nurbs::load(proof.direction);
+  return false;
 }
 
-void FixContactHistoryNurbs::recall(int i, int tag, const nurbs::Vec3& way, nurbs::PairProof* to) const {
-  double most = -1e300;
+// What is proven of the bodies holds for any image of theirs.
+void FixContactHistoryNurbs::recall(int i, int tag, const nurbs::Vec3& way, double images_apart,
+                                    nurbs::PairProof* to) const {
+  double nearest = 0.25 * images_apart * images_apart, most = -1e300;
+  bool touched = false;
   for (int n = 0; n < npartner_[i]; ++n) {
     if (partner_[i][n] != tag) continue;
-    const double along = direction(proof(i, n)).dot(way);
-    if (along > most) most = along, *to = proof(i, n);
+    nurbs::Vec3 apart;
+    const bool touches = offset(proof(i, n).contact, &apart);
+    const double distance = touches ? (apart - way).squaredNorm() : 0;
+    const double along = nurbs::load(proof(i, n).direction).dot(way);
+    if (touches ? distance < nearest : !touched && along > most) {
+      if (touches) nearest = distance, touched = true;
+      most = along;
+      *to = proof(i, n);
+      if (!touches) to->contact = 0;
+    }
   }
-  if (most <= 0) *to = nurbs::PairProof{};  // of other images
 }
 
 int FixContactHistoryNurbs::contacts_size(int i) const {

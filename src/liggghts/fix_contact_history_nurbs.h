@@ -44,8 +44,9 @@ class FixContactHistoryNurbs : public FixContactHistory {
   // What owned particle i remembered of the particle `tag` when the neighbour lists were last made; the host
   // forgets it where the bounding spheres are apart. Nothing when it remembered nothing.
   void recall(int i, int tag, nurbs::PairProof* to) const;
-  // The same where there may be several images of it: `way`, from the lower tag's centre to the other's.
-  void recall(int i, int tag, const nurbs::Vec3& way, nurbs::PairProof* to) const;
+  // The same where there may be several images of it: `way`, from A's centre to B's; no two images are closer
+  // than `images_apart`.
+  void recall(int i, int tag, const nurbs::Vec3& way, double images_apart, nurbs::PairProof* to) const;
 
   // What a pair style leaves to the next between two runs.
   struct Legacy {
@@ -76,7 +77,7 @@ class FixContactHistoryNurbs : public FixContactHistory {
   Legacy legacy_;
 
   nurbs::PairProof& proof(int i, int n) const;
-  nurbs::Vec3 direction(const nurbs::PairProof& proof) const;
+  bool offset(std::int32_t contact, nurbs::Vec3* apart) const;
   nurbs::ContactPool& pool() const;
   void ask_for_room();
   int contacts_size(int i) const;

@@ -198,9 +198,9 @@ void PairGranNurbs::init_style() {
 }
 
 // Across a short periodic edge two particles, or one and its image, can touch twice: each is a contact of its
-// own. What is remembered goes by the partner's number alone; of several it is that whose normal points the
-// way of this image, not what the host may have found first.
-void PairGranNurbs::recall_images(int i) {
+// own. What is remembered goes by the partner's number alone; of several it is that of this image, not what
+// the host may have found first.
+void PairGranNurbs::recall_images(int i, double images_apart) {
   const auto& history = static_cast<const FixContactHistoryNurbs&>(*fix_history);
   const int *tag = atom->tag, count = list->numneigh[i];
   auto* proofs = reinterpret_cast<nurbs::PairProof*>(listgranhistory->firstdouble[i]);
@@ -209,7 +209,7 @@ void PairGranNurbs::recall_images(int i) {
     const int j = partner(jj);
     const Vec3 way = Vec3Map(atom->x[j]) - Vec3Map(atom->x[i]);
     proofs[jj] = nurbs::PairProof{};
-    history.recall(i, tag[j], tag[j] < tag[i] ? Vec3(-way) : way, proofs + jj);
+    history.recall(i, tag[j], is_swapped(i, j) ? Vec3(-way) : way, images_apart, proofs + jj);
   }
 }
 
@@ -240,7 +240,18 @@ void PairGranNurbs::warn_time_step() {
   nurbs_host::warn_news(FLERR, lmp, warning, last_warning_);
 }
 
-// A pair is solved in tag order, so that ranks that both own half of it compute the same bits.
+// A pair is solved in tag order, so that ranks that both own half of it compute the same bits. A body and its
+// own image are there twice, each time with the other side's force; they are solved from low to high place,
+// which makes both the same contact.
+bool PairGranNurbs::is_swapped(int i, int j) const {
+  if (atom->tag[i] != atom->tag[j]) return atom->tag[j] < atom->tag[i];
+  for (int k = 0; k < 3; ++k) {
+    const double way = atom->x[j][k] - atom->x[i][k];
+    if (std::abs(way) > 0.5 * nurbs_host::box_edge(*domain, k)[k]) return way < 0;
+  }
+  return false;
+}
+
 void PairGranNurbs::hand_in_neighbours() {
   stages_.begin_neighbours();
   double shortest = nurbs::kFarAway, radius = 0;
@@ -253,11 +264,11 @@ void PairGranNurbs::hand_in_neighbours() {
   for (int ii = 0; ii < list->inum; ++ii) {
     const int i = list->ilist[ii];
     auto* proofs = reinterpret_cast<nurbs::PairProof*>(listgranhistory->firstdouble[i]);
-    if (short_box) recall_images(i);
+    if (short_box) recall_images(i, shortest);
     for (int jj = 0; jj < list->numneigh[i]; ++jj) {
       const int j = list->firstneigh[i][jj] & NEIGHMASK;
       if (proofs[jj].stamp == 0) history.recall(i, tag[j], proofs + jj);
-      const bool swap = tag[j] < tag[i];
+      const bool swap = is_swapped(i, j);
       stages_.add_neighbour(swap ? j : i, swap ? i : j, proofs + jj);
     }
   }

@@ -95,7 +95,8 @@ class PairGranNurbs : public PairGran {
   void require_host_settings();
   void warn_of_sphere_values();
   void require_all_laws();
-  void recall_images(int i);
+  bool is_swapped(int i, int j) const;
+  void recall_images(int i, double images_apart);
   void warn_time_step();
 
   std::uint64_t fingerprint() const;

@@ -181,6 +181,51 @@ class Heap(unittest.TestCase):
             self.assertLess(np.ptp(ledger), 1e-4 * ledger[0], (degrees, dt))
 
 
+OWN_IMAGE = """
+units si
+newton off
+communicate single vel yes
+boundary p p p
+atom_style nurbs body.json
+read_data bodies.data
+neighbor 0.05 bin
+neigh_modify delay 0 {rebuilt}
+pair_style gran/nurbs
+pair_coeff * * kn 1e6 kt 5e5 mu {mu}
+fix motion all nve/nurbs
+compute ke all ke
+compute er all erotate/nurbs
+compute e all nurbs/energy
+compute st all nurbs/stats
+variable ledger equal c_ke+c_er+c_e[1]+c_e[2]+c_e[3]+c_e[4]
+thermo_style custom step v_ledger c_ke c_er c_e[1] c_e[2] c_e[3] c_e[4] c_st[8]
+thermo_modify norm no format float %.15g
+thermo 200
+timestep 2e-5
+run 12000
+"""
+
+
+class Images(unittest.TestCase):
+    def test_a_body_that_touches_its_own_images(self):
+        """Both halves of such a contact are the same contact, and it is still that of its image, not of another, when the
+        neighbour lists are made anew."""
+        for shape, edges in ((deck.shape_file("box", 0.5, 0.4, 0.3), (1.02, 0.9, 0.7)), (cylinder(0.45, 0.5), (1.0, 0.95, 1.05))):
+            for mu in (0, 0.3):
+                tables = []
+                for rebuilt, ranks in (("", 1), ("", 2), ("every 1 check no", 1)):
+                    files = {"body.json": shape, "bodies.data": deck.data_file(
+                        [atom(1, (0.3, 0.1, 0.2))], [(1, 1.0, 0.5, 0.2, 1.0, 2.0, 3.0)], [(0.0, edge) for edge in edges])}
+                    table = deck.run_ok(OWN_IMAGE.format(rebuilt=rebuilt, mu=mu), files=files, ranks=ranks).thermo
+                    self.assertGreater(table["e[1]"].max(), 0.01 * table["ledger"][0])
+                    self.assertLess(np.ptp(table["ledger"]), 1e-4 * table["ledger"][0])
+                    self.assertLess(np.abs(np.diff(table["ke"])).max(), 1e-12 * table["ke"][0])  # nothing pushes it
+                    tables.append(table)
+                for table in tables[1:]:
+                    for name in table:
+                        np.testing.assert_allclose(table[name], tables[0][name], rtol=0, atol=1e-9 * tables[0]["ledger"][0])
+
+
 class Statics(unittest.TestCase):
     def test_tips_at_the_angle_of_statics(self):
         """Gravity leans about y, fast to a degree and a half before the brink, then by half a degree a second."""
