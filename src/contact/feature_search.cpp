@@ -92,10 +92,11 @@ class LineSearch {
     t.at.gap -= radius_;
     start_ = t.at.where;
     started_ = true;
-    const Vec3 turned = std::cos(angle) * side_ - std::sin(angle) * low_;
-    t.slope = turned.dot(particle_.x - a_ + t.at.on_body);
+    t.slope = turned_at(angle).dot(particle_.x - a_ + t.at.on_body);
     return t;
   }
+  // The way of d when the angle grows.
+  Vec3 turned_at(double angle) const { return std::cos(angle) * side_ - std::sin(angle) * low_; }
 
   // The chord between the two supports has the normal that both share where f has a kink; a secant of the
   // slopes leads to a smooth maximum.
@@ -132,9 +133,12 @@ class LineSearch {
   FeatureContact finish(const Turned& low, const Turned& high) const {
     const Turned& best = low.at.gap > high.at.gap ? low : high;
     FeatureContact c = contact(best.at, best.d);
-    const double drop = low.slope - high.slope;
-    if (low.slope > 0 && high.slope < 0 && drop > 0)
-      c.on_body = low.at.on_body + low.slope / drop * (high.at.on_body - low.at.on_body);
+    // Their own slopes are those of their own directions, which a kink found early leaves apart.
+    const Vec3 turned = turned_at(best.angle);
+    const double to_low = turned.dot(particle_.x - a_ + low.at.on_body),
+                 to_high = turned.dot(particle_.x - a_ + high.at.on_body);
+    if (to_low > 0 && to_high < 0)
+      c.on_body = low.at.on_body + to_low / (to_low - to_high) * (high.at.on_body - low.at.on_body);
     c.along = direction_.dot(particle_.x - a_ + c.on_body);
     return c;
   }

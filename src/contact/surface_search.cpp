@@ -115,25 +115,49 @@ class SurfaceSearch {
     return point;
   }
 
-  // Whether a flat feature of the body stands on the plane.
+  // Whether a polygon over the region overlaps it, and its deepest point.
+  bool polygon_over(const PlaneRegion& region, double reach, double* gap, Vec3* on_body) const {
+    ContactPolygon polygon;
+    if (make_region_polygon(particle_, region, particle_.x, reach, &polygon) != RegionContact::polygon)
+      return false;
+    const PolygonState state = evaluate(polygon, plane_frame(particle_.x), body_frame(particle_));
+    *gap = 0;
+    for (int k = 0; k < state.count; ++k)
+      if (state.gap[k] < *gap) {
+        *gap = state.gap[k];
+        *on_body = state.arm_b[k] + 0.5 * state.gap[k] * state.normal;
+      }
+    return *gap < 0;
+  }
+
+  // Whether a flat feature of the body stands on the plane, over a part of it that is wall.
   bool stand_on(int number) {
     const ActivePlane& met = planes_[number];
     bool stands = false;
     for (int k = 0; k < former_count_ && !stands; ++k)
       stands = former_[k].flat && former_[k].normal.dot(met.normal) > kSamePlane;
+    const bool unbounded = patch_.unbounded(), over = unbounded || cell_below(number) >= 0;
+    const int triangle = unbounded ? 0 : patch_.planes()[number].leader;
     if (!stands) {
       // Where several planes of about one slope are met, the surface is bent under the body, and its features
       // stand on points.
       for (const int other : workspace().active)
         if (other != number && planes_[other].normal.dot(met.normal) > kOneSlope) return false;
+    }
+    if (!stands || !over) {
       PlaneRegion& region = workspace().region;
       plane_region(patch_, number, particle_.x, &region);
-      ContactPolygon polygon;
-      const RegionContact contact =
-          make_region_polygon(particle_, region, particle_.x, -kReach * met.result.gap, &polygon);
-      if (contact != RegionContact::polygon) return false;
+      const double reach = stands ? kKeptReach : kReach;
+      double gap = 0;
+      Vec3 on_body = Vec3::Zero();
+      if (!polygon_over(region, -reach * met.result.gap, &gap, &on_body)) return false;
+      if (!over) {  // the plane's deepest point is beside the wall; the polygon's is on it
+        if (!polygon_over(region, -reach * gap, &gap, &on_body)) return false;
+        add_plane(number, triangle, true, gap, on_body);
+        return true;
+      }
     }
-    add_plane(number, patch_.unbounded() ? 0 : patch_.planes()[number].leader, true);
+    add_plane(number, triangle, true, met.result.gap, met.deepest);
     return true;
   }
 
@@ -243,28 +267,33 @@ class SurfaceSearch {
     return true;
   }
 
-  void touch_face(int number) {
-    const MeshPatch::Plane& plane = patch_.planes()[number];
-    const ActivePlane& met = planes_[number];
-    int triangle = -1;
-    if (patch_.unbounded()) return add_plane(number, 0, false);
-    // The cell that had the point in the last step has it mostly again.
-    for (int i = -1; i < plane.cells && triangle < 0; ++i) {
+  // The cell that has the plane's deepest point, or -1; the one that had it in the last step has it mostly
+  // again.
+  int cell_below(int number) {
+    MeshPatch::Plane& plane = patch_.planes()[number];
+    for (int i = -1; i < plane.cells; ++i) {
       const int cell = i < 0 ? plane.hint : patch_.cell_in(plane.first + i);
-      if (!holds(cell, met)) continue;
-      triangle = patch_.cells()[cell].triangle;
-      patch_.planes()[number].hint = cell;
+      if (!holds(cell, planes_[number])) continue;
+      plane.hint = cell;
+      return cell;
     }
-    if (triangle >= 0) add_plane(number, triangle, false);
+    return -1;
   }
 
-  void add_plane(int number, int triangle, bool flat) {
+  void touch_face(int number) {
+    const ActivePlane& met = planes_[number];
+    const int cell = patch_.unbounded() ? -1 : cell_below(number);
+    if (!patch_.unbounded() && cell < 0) return;
+    add_plane(number, cell < 0 ? 0 : patch_.cells()[cell].triangle, false, met.result.gap, met.deepest);
+  }
+
+  void add_plane(int number, int triangle, bool flat, double gap, const Vec3& on_body) {
     const ActivePlane& met = planes_[number];
     SurfaceContact c;
     c.flat = flat;
-    c.gap = met.result.gap;
+    c.gap = gap;
     c.normal = met.normal;
-    c.on_body = met.deepest;
+    c.on_body = on_body;
     c.triangle = triangle;
     c.plane = number;
     c.of[0] = patch_.unbounded() ? 0 : patch_.planes()[number].leader;

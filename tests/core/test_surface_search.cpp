@@ -119,6 +119,7 @@ struct Sum {
   Vec3 force = Vec3::Zero(), torque = Vec3::Zero();
   int count = 0, negative = 0;
   double deepest = 0;
+  bool flat = false;
 };
 
 Sum search(const Particle& p, const Mesh& mesh) {
@@ -137,6 +138,7 @@ Sum search(const Particle& p, const Mesh& mesh) {
     s.force += force;
     s.torque += (c.on_body - 0.5 * c.gap * c.normal).cross(force);
     s.negative += c.weight < 0;
+    s.flat |= c.flat;
     s.deepest = std::max(s.deepest, -c.gap);
   }
   return s;
@@ -345,6 +347,74 @@ TEST(SurfaceSearch, FinerTroughsAndRollsTendToTheRoundOnes) {
     EXPECT_LT(errors.back(), 0.02);
     EXPECT_LT(errors.back(), 0.2 * errors[1]);
   }
+}
+
+Mesh ridge_along_y(double slope) {
+  Mesh mesh;
+  for (const double side : {-1.0, 1.0})
+    mesh.add(Vec3(0, -3, 0), Vec3(0, 3, 0), Vec3(3 * side, 0, -3 * slope));
+  return mesh;
+}
+
+// A box's corners on the faces and its edges across the ridge: the force acts where they cross. (The search
+// for the direction once ended at the kink, whose normal is right, with the point of another direction.)
+TEST(SurfaceSearch, ForceOfABoxOnARidgeIsTheGradientOfItsEnergy) {
+  Random random(11);
+  int crossings = 0, jumps = 0;
+  for (const double slope : {0.2, 1.0})
+    for (int round = 0; round < 200; ++round) {
+      const Mesh mesh = ridge_along_y(slope);
+      const Particle p = pressed(test::cuboid(), mesh, 0.01, random, 0.5);
+      const Sum s = search(p, mesh);
+      if (s.count != 1 || s.flat) continue;  // a polygon's energy is that of its points
+      const Vec3 way = random.direction(), axis = random.direction();
+      constexpr double h = 1e-6;
+      double energy[2];
+      for (const int side : {0, 1}) {
+        Particle q = p;
+        q.x += (2 * side - 1) * h * way;
+        q.q = Quat(Eigen::AngleAxisd((2 * side - 1) * h, axis)) * p.q;
+        energy[side] = search(q, mesh).energy;
+      }
+      if (std::abs(energy[1] - 2 * s.energy + energy[0]) >
+          1e-3 * h * s.force.norm()) {  // another corner or edge
+        ++jumps;
+        continue;
+      }
+      const double slope_of = (energy[1] - energy[0]) / (2 * h);
+      EXPECT_NEAR(slope_of, -s.force.dot(way) - s.torque.dot(axis), 1e-5 * s.force.norm()) << round;
+      crossings += std::abs(s.force.normalized().y()) < 1e-9 &&
+                   std::abs(s.force.normalized().z() - 1 / std::hypot(1, slope)) > 1e-6;
+    }
+  EXPECT_GT(crossings, 50);
+  EXPECT_LT(jumps, 8);
+}
+
+// A box across a ridge may be far below the plane of one side, but only beyond the ridge.
+TEST(SurfaceSearch, APlaneHoldsNothingBesideItsTriangles) {
+  Random random(12);
+  constexpr double slope = 0.2;
+  const Mesh mesh = ridge_along_y(slope);
+  int clear = 0, touching = 0;
+  for (int round = 0; round < 2000; ++round) {
+    Particle box;
+    box.shape = test::cuboid().get();
+    box.q = random.turn_by(random.uniform(0, 0.15));
+    box.x = Vec3(random.uniform(-0.4, 0.4), random.uniform(-0.4, 0.4), random.uniform(0.55, 0.8));
+    const Vec3 half(1, 0.8, 0.6);
+    bool meets = false;  // a corner below both sides, or the ridge within the box
+    for (int corner = 0; corner < 8; ++corner) {
+      const Vec3 sign(corner & 1 ? 1 : -1, corner & 2 ? 1 : -1, corner & 4 ? 1 : -1);
+      const Vec3 at = box.x + box.q * half.cwiseProduct(sign);
+      meets |= at.z() < -slope * std::abs(at.x());
+    }
+    for (double y = -3; y < 3; y += 1e-3)
+      meets |= ((box.q.conjugate() * (Vec3(0, y, 0) - box.x)).cwiseAbs() - half).maxCoeff() < 0;
+    EXPECT_EQ(search(box, mesh).count > 0, meets) << round;
+    ++(meets ? touching : clear);
+  }
+  EXPECT_GT(clear, 500);
+  EXPECT_GT(touching, 300);
 }
 
 TEST(SurfaceSearch, RidgeValleyAndVertex) {

@@ -240,9 +240,22 @@ class BentMeshes(unittest.TestCase):
                 energy = self.mechanical(out) / self.mechanical(out)[0]
                 self.assertLess(energy.max(), 1.002)
                 dissipated = (out.thermo["led[3]"] + out.thermo["led[4]"]) / self.mechanical(out)[0]
-                np.testing.assert_allclose(energy + dissipated, 1, rtol=0, atol=0.015)
+                np.testing.assert_allclose(energy + dissipated, 1, rtol=0, atol=0.007)
                 if before == "":
-                    self.assertGreater(energy.min(), 0.98)
+                    self.assertGreater(energy.min(), 0.99)
+
+    def test_a_box_over_a_ridge(self):
+        """Edges across the ridge, corners on its sides, faces on a side and over it; nothing is felt of a side beyond it."""
+        low = ((-0.2, 0.2), (-0.2, 0.2), (-0.4, 0.4))
+        for slope in (0.2, 1.0):
+            ridge = sheet(6, 0.18, lambda x, y: -slope * abs(x))
+            for seed in range(6):
+                out = self.bounce(seed, 0, 0, mesh=ridge, gravity=9.81, steps="run 8000", box=low)
+                energy = self.mechanical(out, 9.81) / self.mechanical(out, 9.81)[0]
+                dissipated = (out.thermo["led[3]"] + out.thermo["led[4]"]) / self.mechanical(out, 9.81)[0]
+                self.assertLess(energy.max(), 1.003)
+                self.assertGreater(energy.min(), 0.97)
+                np.testing.assert_allclose(energy + dissipated, 1, rtol=0, atol=0.01)
 
     def test_the_cut_does_not_matter(self):
         whole, fine = bumpy(7, 3e-3, 8), []
