@@ -9,9 +9,10 @@
 namespace nurbs {
 namespace {
 
-constexpr double kCoarsest = M_PI / 4;  // rad, between directions where maxima are looked for first ...
-constexpr double kFinest = 2e-3;        // and where there may be some,
-constexpr double kNearest = 0.02;       // or this far apart on the wall, in sizes of the body
+constexpr double kCoarsest = M_PI / 4;     // rad, between directions where maxima are looked for first ...
+constexpr double kFinest = 2e-3;           // and where there may be some,
+constexpr double kNearest = 0.02;          // or this far apart on the wall, in sizes of the body
+constexpr double kLevel = 16 * kRoundoff;  // of sizes: values that are one
 
 // F and its slope along the circle, from one support search.
 struct Reach {
@@ -22,10 +23,11 @@ struct Reach {
 
 class Tube {
  public:
-  // `ahead`: where angles are counted from, square to the axis; may be zero.
+  // `ahead`: where angles are counted from; may be zero.
   Tube(const Particle& particle, const Vec3& origin, const Vec3& axis, const Vec3& ahead)
       : particle_(particle),
-        u_(ahead.squaredNorm() > 0 ? Vec3(ahead.normalized()) : axis.unitOrthogonal()),
+        u_(ahead.squaredNorm() > 0 ? Vec3((ahead - ahead.dot(axis) * axis).normalized())
+                                   : axis.unitOrthogonal()),
         v_(axis.cross(u_)),
         apart_(particle.x - origin) {}
 
@@ -125,8 +127,11 @@ void add_inside(const Tube& tube, const Reach& top, double radius, SurfaceContac
 // Returns what F is nowhere larger than, or infinity.
 double find_inside(const Particle& particle, const Vec3& origin, const Vec3& axis, double radius,
                    SurfaceContacts* out) {
-  const Vec3 apart = particle.x - origin, across = apart - apart.dot(axis) * axis;
-  const double size = particle.scale * particle.shape->bounding_radius, distance = across.norm();
+  const Vec3 apart = particle.x - origin;
+  const double size = particle.scale * particle.shape->bounding_radius;
+  Vec3 across = apart - apart.dot(axis) * axis;
+  if (across.norm() < kLevel * (size + apart.norm())) across.setZero();  // its direction would be round-off's
+  const double distance = across.norm();
   const Tube tube(particle, origin, axis, across);
   // F'' = (curvature radius of the body's outline) - F: where the body is everywhere more curved than the
   // tube, F has one maximum above the radius, if any.
@@ -160,11 +165,22 @@ double find_inside(const Particle& particle, const Vec3& origin, const Vec3& axi
     sample(tube, low, high, radius, finest, &samples);
     low = high;
   }
+  // A round body along the axis of a narrower tube touches it all around, where slopes are round-off: of
+  // maxima that F does not fall between, one stands for all.
+  const double same = kLevel * (size + apart.norm());
+  const Reach* highest = &samples.at[0];
+  double last_top = HUGE_VAL, least = -HUGE_VAL;  // of F since the last maximum
   for (int k = 1; k < samples.count; ++k) {
     const Reach &from = samples.at[k - 1], &to = samples.at[k];
-    if (from.slope > 0 && to.slope <= 0 && most_between(from, to) > radius)
-      add_inside(tube, tube.top(from, to), radius, out);
+    if (to.value > highest->value) highest = &to;
+    if (from.slope > 0 && to.slope <= 0 && most_between(from, to) > radius) {
+      const Reach top = tube.top(from, to);
+      if (least < std::min(last_top, top.value) - same) add_inside(tube, top, radius, out);
+      last_top = least = top.value;
+    }
+    least = std::min(least, to.value);
   }
+  if (out->count == 0) add_inside(tube, *highest, radius, out);
   return samples.bound;
 }
 

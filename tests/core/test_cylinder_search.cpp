@@ -98,4 +98,34 @@ TEST(CylinderSearch, contacts_inside_are_the_maxima_of_the_reach) {
   EXPECT_GE(several, 3);
 }
 
+// A ring of contacts is one contact, at round-off's place, whatever the body's poles do; beside the axis it
+// is where the body is.
+TEST(CylinderSearch, a_round_body_on_the_axis_of_a_narrower_tube_has_one_contact) {
+  Random random(8);
+  const ShapePointer shapes[] = {sphere(), make_shape("tablet", rounded_cylinder(1, 0.4, 0.15)), disc(),
+                                 polar()};
+  for (int n = 0; n < 80; ++n) {
+    const Shape& shape = *shapes[n % 4];
+    Particle p;
+    p.shape = &shape;
+    p.scale = random.uniform(0.5, 1.5);
+    p.q = random.turn();
+    // The tube is along the body's axis, which has its points furthest away in a ring.
+    const Vec3 axis = p.q * Vec3::UnitZ(), origin = random.box(-1, 1);
+    p.x = origin + random.uniform(-2, 2) * axis;
+    const double reach = -gap_along(p, origin, -axis.unitOrthogonal(), nullptr).gap, radius = 0.97 * reach;
+    SCOPED_TRACE(shape.name + " " + std::to_string(n));
+    SurfaceContacts found;
+    find_cylinder_contacts(p, origin, axis, radius, 5, &found);
+    ASSERT_EQ(found.count, 1);
+    EXPECT_NEAR(found.contact[0].gap, radius - reach, 1e-12 * reach);
+    const Vec3 aside = axis.unitOrthogonal();
+    p.x += 1e-6 * reach * aside;
+    find_cylinder_contacts(p, origin, axis, radius, 5, &found);
+    ASSERT_EQ(found.count, 1);
+    EXPECT_NEAR(found.contact[0].gap, radius - (1 + 1e-6) * reach, 1e-12 * reach);
+    EXPECT_NEAR(-found.contact[0].normal.dot(aside), 1, 1e-8);
+  }
+}
+
 }  // namespace

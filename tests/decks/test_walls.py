@@ -424,6 +424,17 @@ class Cylinders(unittest.TestCase):
         self.assertEqual(out.thermo["st[8]"][0], 2)
         np.testing.assert_allclose(out.thermo["w"][0], 2 * 0.5e5 * 1e-8, rtol=1e-6)
 
+    def test_a_ball_on_the_axis_of_a_narrower_tube(self):
+        """One contact for the ring, as a little beside the axis; the energy is the same, and the ball stays."""
+        for aside in (0.0, 1e-9):
+            ball = [(1, 1, 1, 0.05, 2500.0, aside, 0.0, 0.1, 1.0, 0.0, 0.0, 0.0)]
+            out = run("cylinder y 0.0499 0 0.1", ball, (), body=shape("sphere", 1), gravity=None, law="kn 1e5 kt 5e4 mu 0",
+                      steps="run 400", after="thermo 1", dt=1e-6)
+            np.testing.assert_array_equal(out.thermo["st[8]"], 1)
+            np.testing.assert_allclose(out.thermo["w"][0], 0.5e5 * (1e-4 + aside)**2, rtol=1e-6)
+            self.assertLess(np.abs(frames(out)[-1, 0, :3] - (0, 0, 0.1)).max(), 1e-8)
+            self.assertLess(np.ptp(out.thermo["ledger"]), 1e-3 * out.thermo["w"][0])
+
     def test_energy_closes(self):
         ball = [(1, 1, 1, 0.03, 2500.0, 0.03, 0.0, 0.1, 0.9, 0.3, 0.1, 0.2)]
         out = run("cylinder y 0.1 0 0.12", ball, [(1, 0, 0.3, 0, 5, 0, 3)], law="kn 1e5 kt 5e4 mu 0.3", steps="run 15000")
