@@ -81,7 +81,7 @@ SCENES = {scene.name: scene for scene in (
     Scene("packing", ("1.25", "1", "0.8"), "packing fraction",
           lambda place: example("packing").last(place / "log.packing")[0],
           small=(("0 0.1 0 0.1 0 0.1", "0 0.07 0 0.07 0 0.07"),)),
-    Scene("hopper", LONG, "grains a second", lambda place: example("hopper").rate(place)[0],
+    Scene("hopper", LONG, "grains a second", lambda place: example("hopper").rate([place])[0],
           small=(("particles_in_region 1600", "particles_in_region 400"), ("0 0 0.026 0.005 0.3 ", "0 0 0.020 0.005 0.28 "),
                  ("run          8000", "run          4000"), ("run          12000", "run          5500")),
           quiet=(("dump         surfaces all nurbs/vtk 4000 hopper-*.vtu\n", "thermo 500\n"),),

@@ -3,7 +3,8 @@
 //   compute ID group nurbs/stats      vector: 1 neighbour pairs, 2 skipped as safe, 3 rejected by bounds, 4
 //   served by the
 //                                     local model, 5 solved warm, 6 solved cold, 7 by the fallback, 8
-//                                     contacts, 9 Newton iterations, 10 unresolved
+//                                     contacts, 9 Newton iterations, 10 unresolved, 11
+//                                     deeper than a tenth of the smaller bounding radius
 // A pair across two ranks is searched on both and counts half on each. A particle counts as a wall's
 // neighbour when its bounding sphere reaches the wall.
 #ifdef COMPUTE_CLASS

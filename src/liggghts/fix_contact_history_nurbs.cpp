@@ -49,6 +49,7 @@ void FixContactHistoryNurbs::post_run() {
   if (!serves_nurbs()) return;
   setup_pre_exchange();
   pair()->end_run();
+  pair()->warn_deep_run();
 }
 
 nurbs::ContactPool& FixContactHistoryNurbs::pool() const {

@@ -263,6 +263,10 @@ void FixWallNurbs::warn_deep(const char* when) {
                         last_deep_warning_);
 }
 
+void FixWallNurbs::post_run() {
+  nurbs_host::warn_deep_run(lmp, stages_.deep_in_run(), std::string("Fix wall/nurbs ") + id);
+}
+
 void FixWallNurbs::hand_in_neighbours() {
   stages_.begin_neighbours();
   for (int i = 0; i < atom->nlocal; ++i)

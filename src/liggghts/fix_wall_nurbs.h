@@ -44,6 +44,7 @@ class FixWallNurbs : public Fix {
   int setmask() override;
   void init() override;
   void setup(int vflag) override;
+  void post_run() override;
   void initial_integrate(int vflag) override;
   void pre_exchange() override;
   void setup_pre_force(int vflag) override;

@@ -45,6 +45,13 @@ constexpr Keyword kKeywords[] = {{"kn", &ContactCoefficients::kn, true, true},
                                  {"ct", &ContactCoefficients::ct, false, false},
                                  {"mu", &ContactCoefficients::mu, true, false}};
 
+nurbs::DeepContacts of_all_ranks(LAMMPS* lmp, const nurbs::DeepContacts& mine) {
+  nurbs::DeepContacts all;
+  MPI_Allreduce(&mine.count, &all.count, 1, MPI_DOUBLE, MPI_SUM, lmp->world);
+  MPI_Allreduce(&mine.deepest, &all.deepest, 1, MPI_DOUBLE, MPI_MAX, lmp->world);
+  return all;
+}
+
 int index_of(const std::string& name) {
   for (int k = 0; k < 5; ++k)
     if (name == kKeywords[k].name) return k;
@@ -107,15 +114,26 @@ Vec3 box_edge(const Domain& domain, int k) {
 
 void warn_deep(LAMMPS* lmp, const nurbs::DeepContacts& mine, const std::string& user, const std::string& when,
                const std::string& hint, std::string& last) {
-  nurbs::DeepContacts all;
-  MPI_Allreduce(&mine.count, &all.count, 1, MPI_DOUBLE, MPI_SUM, lmp->world);
-  MPI_Allreduce(&mine.deepest, &all.deepest, 1, MPI_DOUBLE, MPI_MAX, lmp->world);
+  const nurbs::DeepContacts all = of_all_ranks(lmp, mine);
   if (all.count == 0) return;
   char numbers[128];
   std::snprintf(numbers, sizeof numbers,
                 "contacts deeper than %g %% of the bounding radius: %.0f, deepest %.3g %%",
                 100 * nurbs::DeepContacts::kDepth, all.count, 100 * all.deepest);
   warn_news(FLERR, lmp, user + ": " + when + " " + numbers + "; " + hint, last);
+}
+
+void warn_deep_run(LAMMPS* lmp, const nurbs::DeepContacts& mine, const std::string& user) {
+  const nurbs::DeepContacts all = of_all_ranks(lmp, mine);
+  if (all.count == 0) return;
+  char numbers[128];
+  std::snprintf(numbers, sizeof numbers,
+                "in the run contacts were deeper than %g %% of the bounding radius, the deepest by %.3g %%",
+                100 * nurbs::DeepContacts::kDepth, 100 * all.deepest);
+  warn(FLERR, lmp,
+       user + ": " + numbers +
+           ", [11] of compute nurbs/stats counts them; such contacts need not keep energy: are they too "
+           "soft?");
 }
 
 bool wants_ledger(const LAMMPS* lmp) {

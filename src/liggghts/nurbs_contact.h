@@ -46,6 +46,9 @@ inline nurbs::ContactSettings contacts_only() {
 void warn_deep(LAMMPS* lmp, const nurbs::DeepContacts& mine, const std::string& user, const std::string& when,
                const std::string& hint, std::string& last);
 
+// The same at the end of a run, of those of its steps.
+void warn_deep_run(LAMMPS* lmp, const nurbs::DeepContacts& mine, const std::string& user);
+
 // Whether an input script has asked for the energies of the contacts (compute nurbs/energy).
 bool wants_ledger(const LAMMPS* lmp);
 

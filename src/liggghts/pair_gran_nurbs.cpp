@@ -343,6 +343,10 @@ void PairGranNurbs::compute_force(int eflag, int vflag, int addflag) {
   if (storeContactForcesStress()) fix_contact_forces_stress()->do_forward_comm();
 }
 
+void PairGranNurbs::warn_deep_run() {
+  nurbs_host::warn_deep_run(lmp, stages_.deep_in_run(), kUser);
+}
+
 void PairGranNurbs::add_forces() {
   for (const int i : stages_.loaded()) {
     const nurbs::ContactStages::Sum sum = stages_.sum(i);

@@ -309,11 +309,13 @@ void ContactStages::count(const ContactResult& r, int a, int b) {
     unresolved_.particle_b = step_.bodies->particle(b);
     if (a >= 0) unresolved_.particle_a = step_.bodies->particle(a);
   }
-  if (!touches(r)) return;
-  const double depth = -r.gap / smaller_radius(a, b);
-  if (depth <= DeepContacts::kDepth) return;
-  deep_.count += weight;
-  deep_.deepest = std::max(deep_.deepest, depth);
+}
+
+void ContactStages::note_depth(int a, int b, double gap) {
+  const double radius = smaller_radius(a, b);
+  if (!(-gap > DeepContacts::kDepth * radius)) return;
+  deep_.count += share(a, b);
+  deep_.deepest = std::max(deep_.deepest, -gap / radius);
 }
 
 // --- stages (c) to (f)
@@ -331,6 +333,7 @@ void ContactStages::begin_step(const Step& step) {
   step_ = step;
   counts_ = ContactCounts{};
   deep_ = DeepContacts{};
+  if (step.setup) deep_in_run_ = DeepContacts{};
   unresolved_ = Unresolved{};
   fresh_.clear();
   for (const int i : loaded_) sums_[i] = Accumulator{};
@@ -350,6 +353,10 @@ void ContactStages::end_step(double neighbours) {
   for (int n = ContactCounts::bounds; n <= ContactCounts::fallback; ++n) others += counts_.value[n];
   counts_.value[ContactCounts::neighbours] = neighbours;
   counts_.value[ContactCounts::safe] = std::max(0.0, neighbours - others);
+  counts_.value[ContactCounts::deep] = deep_.count;
+  if (step_.setup) return;
+  deep_in_run_.count = std::max(deep_in_run_.count, deep_.count);
+  deep_in_run_.deepest = std::max(deep_in_run_.deepest, deep_.deepest);
 }
 
 // What the coming block's local models and laws read: more contacts than a cache holds stream from memory,
@@ -459,15 +466,19 @@ void ContactStages::compute_block(ContactBlock& block) {
     if (left.any) settle_left(block, lane, results, left);
     if (step_.setup) {
       const bool first = results.touching[lane] != 0 && block.field[kStateField][lane] == 0;
-      if (!(first && may_be_flat(a, b) && make_flat(block, lane, results))) start_run(block, lane, results);
+      if (first && may_be_flat(a, b) && make_flat(block, lane, results)) continue;
+      start_run(block, lane, results);
+      if (results.touching[lane] != 0 && sign(block, lane) > 0) note_depth(a, b, results.gap[lane]);
       continue;
     }
     if (results.touching[lane] != 0) {
       relax_weight(block, lane, results.gap[lane]);
-      if (may_be_flat(a, b) && make_flat(block, lane, results))
+      if (may_be_flat(a, b) && make_flat(block, lane, results)) {
         results.touching[lane] = 0;
-      else
-        ++touching;
+        continue;
+      }
+      ++touching;
+      if (sign(block, lane) > 0) note_depth(a, b, results.gap[lane]);
       continue;
     }
     close(block, lane);

@@ -33,13 +33,14 @@ struct ContactCounts {
     contacts,
     iterations,
     unresolved,
+    deep,
     size
   };
   std::array<double, size> value{};
   void add(const ContactResult& result, double weight);
 };
 
-// Contacts at the start of a run that are too deep for a penalty law.
+// Contacts that are too deep for a penalty law, of a step, or the most and the deepest of a run's steps.
 struct DeepContacts {
   static constexpr double kDepth = 0.1;  // of the smaller bounding radius
   double count = 0, deepest = 0;
@@ -156,6 +157,7 @@ class ContactStages {
 
   const ContactCounts& counts() const { return counts_; }
   const DeepContacts& deep() const { return deep_; }
+  const DeepContacts& deep_in_run() const { return deep_in_run_; }
   const Unresolved& unresolved() const { return unresolved_; }  // the first of the last compute
   EnergyLedger& dissipated() { return dissipated_; }
   const EnergyLedger& dissipated() const { return dissipated_; }
@@ -205,6 +207,7 @@ class ContactStages {
   void look(int k);
   ContactResult search(int a, int b, PairMemory& memory);
   void count(const ContactResult& result, int a, int b);
+  void note_depth(int a, int b, double gap);
 
   void prefetch(const ContactBlock& block) const;
   void prefetch_pair(int a, int b, const PairProof* proof) const;
@@ -322,7 +325,7 @@ class ContactStages {
   double neighbour_weight_ = 0;
   Step step_;
   ContactCounts counts_;
-  DeepContacts deep_;
+  DeepContacts deep_, deep_in_run_;
   Unresolved unresolved_;
   EnergyLedger dissipated_;
 };

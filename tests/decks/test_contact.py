@@ -349,8 +349,29 @@ dump p all local 100 pgl.dump c_pgl[7] c_pgl[8] c_pgl[10] c_pgl[11] c_pgl[12] c_
             self.assertIn(": 2, deepest 220 %;", wall)
             self.assertIn("normal reversed?", wall)
 
+    def test_deep_contacts_in_a_run_are_counted(self):
+        """Balls thrown at each other and at the wall, and a box on its face, which has a polygon there."""
+        atoms = [(1, 2, 2, 0.025, 2500.0, -0.03, 0.0, 0.2, 1.0, 0.0, 0.0, 0.0), (2, 2, 2, 0.025, 2500.0, 0.03, 0.0, 0.2, 1.0, 0.0, 0.0, 0.0),
+                 (3, 2, 2, 0.025, 2500.0, 0.0, 0.1, 0.05, 1.0, 0.0, 0.0, 0.0), (4, 1, 1, 0.025, 2500.0, 0.0, -0.1, 0.05, 1.0, 0.0, 0.0, 0.0)]
+        speeds = [(1, 6.0, 0.0, 0.0, 0.0, 0.0, 0.0), (2, -6.0, 0.0, 0.0, 0.0, 0.0, 0.0), (3, 0.0, 0.0, -8.0, 0.0, 0.0, 0.0),
+                  (4, 0.0, 0.0, -12.0, 0.0, 0.0, 0.0)]
+        given = {**files(), "ell.json": deck.box_shape(1, 1, 1), "bodies.data": deck.data_file(atoms, speeds, BOX, types=2)}
+        text = scene(run="run 1500\nrun 0", extra="thermo_style custom step c_st[8] c_st[11]\nthermo 10")
+        found = []
+        for ranks in (1, 2):
+            run = deck.run_ok(text, ranks=ranks, files=given)
+            self.assertFalse(self.warnings(run, "at the start"))
+            pair, = self.warnings(run, "Pair gran/nurbs: in the run contacts were deeper than 10 %")
+            wall, = self.warnings(run, "Fix wall/nurbs w: in the run contacts were deeper than 10 %")
+            self.assertEqual(run.tables[0]["st[11]"][0], 0)
+            self.assertGreaterEqual(run.tables[0]["st[11]"].max(), 2)
+            self.assertGreater(float(wall.split("deepest by ")[1].split()[0]), 40)  # the box
+            self.assertLess(float(pair.split("deepest by ")[1].split()[0]), 40)
+            found.append((pair, wall, list(run.tables[0]["st[11]"])))
+        self.assertEqual(*found)
+
     def test_shallow_contacts_are_not_warned_of(self):
-        self.assertFalse(self.warnings(deck.run_ok(scene(run="run 4321\nrun 1"), files=files()), "at the start"))
+        self.assertFalse(self.warnings(deck.run_ok(scene(run="run 4321\nrun 1"), files=files()), "10 %"))
 
 
 class BadInput(unittest.TestCase):
