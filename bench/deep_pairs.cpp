@@ -16,11 +16,13 @@
 #include "bench/machine.h"
 #include "contact/pair_search.h"
 #include "shapes/primitives.h"
+#include "support/surface_cloud.h"
 
 namespace nurbs {
 namespace {
 
-constexpr int kCloud = 5000;        // surface points per body, about
+using test::SurfaceCloud;
+
 constexpr int kDirections = 1500;   // 0.09 rad apart
 constexpr double kNeighbour = 0.2;  // rad: a direction lower than all this near is a local minimum
 constexpr int kCircle = 360;        // directions on a great circle
@@ -51,88 +53,8 @@ const std::vector<std::vector<int>>& neighbours() {
   return all;
 }
 
-// A body as a cloud of surface points, patch by patch on a grid that includes the edges.
-class Cloud {
- public:
-  explicit Cloud(const Shape& shape) : shape_(shape) {
-    const int patches = static_cast<int>(shape.patches.size());
-    per_side_ = std::max(5, static_cast<int>(std::sqrt(kCloud / patches)));
-    points_.resize(patches * per_side_ * per_side_, 3);
-    for (int p = 0, at = 0; p < patches; ++p)
-      for (int i = 0; i < per_side_; ++i)
-        for (int j = 0; j < per_side_; ++j, ++at)
-          points_.row(at) = evaluate0(shape.patches[p], parameter(i), parameter(j)).array();
-  }
-
-  // Largest d . x over the cloud: below the support function by up to some 1e-3.
-  double coarse(const Vec3& d) const {
-    return (points_.col(0) * d[0] + points_.col(1) * d[1] + points_.col(2) * d[2]).maxCoeff();
-  }
-
-  // The support function.
-  double exact(const Vec3& d) const {
-    const int count = per_side_ * per_side_;
-    heights_ = points_.col(0) * d[0] + points_.col(1) * d[1] + points_.col(2) * d[2];
-    double best = heights_.maxCoeff();
-    const double near = best - 0.01 * shape_.bounding_radius;
-    for (size_t p = 0; p < shape_.patches.size(); ++p) {
-      const auto block = heights_.segment(p * count, count);
-      if (block.maxCoeff() < near) continue;
-      int at;
-      block.maxCoeff(&at);
-      best =
-          std::max(best, ascend(shape_.patches[p], d, parameter(at / per_side_), parameter(at % per_side_)));
-    }
-    return best;
-  }
-
- private:
-  double parameter(int i) const { return i / double(per_side_ - 1); }
-
-  // Newton where d . x is concave, else along the gradient; inside the patch, only ever up.
-  static double ascend(const BezierPatch& patch, const Vec3& d, double u, double v) {
-    Jet2 jet = evaluate2(patch, u, v);
-    double h = d.dot(jet.s);
-    for (int iteration = 0; iteration < 40; ++iteration) {
-      Eigen::Vector2d g(d.dot(jet.su), d.dot(jet.sv));
-      Eigen::Matrix2d m;
-      m << d.dot(jet.suu), d.dot(jet.suv), d.dot(jet.suv), d.dot(jet.svv);
-      const double at[2] = {u, v};
-      for (int k = 0; k < 2; ++k)
-        if ((at[k] <= 0 && g[k] <= 0) || (at[k] >= 1 && g[k] >= 0)) {  // held by an edge
-          g[k] = 0;
-          m(0, 1) = m(1, 0) = 0;
-          m(k, k) = -1;
-        }
-      const double metric[2] = {jet.su.squaredNorm() + 1e-12, jet.sv.squaredNorm() + 1e-12};
-      Eigen::Vector2d step(g[0] / metric[0], g[1] / metric[1]);
-      if (m.determinant() > 1e-14 * m.squaredNorm() && m.trace() < 0) step = -m.inverse() * g;
-      bool moved = false;
-      for (int halving = 0; halving < 30 && !moved; ++halving, step *= 0.5) {
-        const double u2 = std::clamp(u + step[0], 0.0, 1.0), v2 = std::clamp(v + step[1], 0.0, 1.0);
-        if (std::abs(u2 - u) + std::abs(v2 - v) < 1e-13) return h;
-        const Jet2 next = evaluate2(patch, u2, v2);
-        const double h2 = d.dot(next.s);
-        if (!(h2 > h)) continue;
-        u = u2;
-        v = v2;
-        h = h2;
-        jet = next;
-        moved = true;
-      }
-      if (!moved) break;
-    }
-    return h;
-  }
-
-  const Shape& shape_;
-  int per_side_;
-  Eigen::Array<double, Eigen::Dynamic, 3> points_;
-  mutable Eigen::ArrayXd heights_;
-};
-
 struct Placed {
-  const Cloud &cloud_a, &cloud_b;
+  const SurfaceCloud &cloud_a, &cloud_b;
   Particle a, b;
   double coarse(const Vec3& d) const {
     return a.scale * cloud_a.coarse(a.q.conjugate() * d) + b.scale * cloud_b.coarse(b.q.conjugate() * -d) -
@@ -303,7 +225,7 @@ int main_program(int argc, char** argv) {
     return 1;
   }
   const std::vector<bench::Body> all = bodies();
-  std::vector<Cloud> clouds;
+  std::vector<SurfaceCloud> clouds;
   for (const bench::Body& body : all) clouds.emplace_back(*body.shape);
   const int count = static_cast<int>(all.size());
   std::vector<std::pair<int, int>> combinations;

@@ -20,6 +20,8 @@ struct Witness {
 };
 
 constexpr int kBeforeRings = 64;          // queries before rings of directions are looked for
+constexpr int kAtPoles = 256;             // ... and where the least overlap is along an axis
+constexpr double kPolar = 0.1;            // sine of the angle from it
 constexpr int kMostIdle = 30;             // queries in a row that leave the bracket as it is
 constexpr double kOneMinimum = 1 - 1e-6;  // cosine above which Newton has come to one minimum again
 constexpr double kFlatBend = 1e-3;        // of the overlap, of its bend along a crease
@@ -395,6 +397,14 @@ class Search {
   GrowingHull hull_;
 };
 
+// Along an axis of revolution, where a ring of directions is hardly one.
+bool is_polar(const PairFrame& pair, const Vec3& d) {
+  const auto along = [&](const Shape& shape, const Vec3& axis) {
+    return shape.revolution.found && !shape.proofs.sphere && d.cross(axis).squaredNorm() < kPolar * kPolar;
+  };
+  return along(*pair.a, pair.a->revolution.axis) || along(*pair.b, pair.turn * pair.b->revolution.axis);
+}
+
 }  // namespace
 
 PolytopeResult solve_polytope(const PairFrame& pair, const Vec3& seed, double tolerance, double enough) {
@@ -410,6 +420,10 @@ PolytopeResult solve_polytope(const PairFrame& pair, const Vec3& seed, double to
     if (started && attempt == 0 && (pair.a->revolution.found || pair.b->revolution.found)) {
       search.run(enough, kBeforeRings);
       best = search.result();
+      if (!best.converged && is_polar(pair, best.bracket.direction)) {
+        search.run(enough, kAtPoles);
+        best = search.result();
+      }
       if (!best.converged && search_rings(pair, tolerance, &best)) return best;
     }
     if (started) search.run(enough, kHullVertices);

@@ -16,6 +16,9 @@ constexpr double kClosedShare = 0.9;    // of the tolerance at which a sector is
 constexpr double kMeridianShare = 0.4;  // ... and below which its width, not its circles, keeps it open
 constexpr double kLeastTilt = 3e-3;     // sine between the axes from which the mate's tip may do better
 constexpr int kFirstAngles = 7;
+constexpr int kBeside = 3;              // circles looked at on either side of a range of angles
+constexpr double kChord = 1.05;         // up to 0.5 rad: no less than the angle over its chord or sine
+constexpr double kWidestSecond = 0.88;  // cosine of that
 
 // One body of revolution K and its mate M: axes and lengths of the pair frame, e = sign d.
 struct View {
@@ -68,8 +71,8 @@ struct Circle {
   Vec3 middle;  // M's point, or the centre of its circle, from M's centre ...
   Vec3 k;       // ... and from K's `point`
   double rm;    // radius of that circle
-  Angle at;     // angle from the axis it was asked for
-  Vec3 x, xm;   // the supports themselves, from the bodies' centres
+  Angle at;     // angle from the axis it was asked for ...
+  Vec3 e;       // ... and the direction
 };
 
 // (R, Z) of a circle at one azimuth.
@@ -84,6 +87,10 @@ struct Least {
   int from, to;     // circles level there, equal at an end of the range
   Angle low, high;  // all that is below the threshold lies between
 };
+
+double square(double x) {
+  return x * x;
+}
 
 double cross(const Angle& x, const Angle& y) {
   return x.c * y.s - x.s * y.c;
@@ -215,20 +222,21 @@ class RingSearch {
                   m = find_hull_support(*view_.m, view_.turn_m.transpose() * -e, nullptr,
                                         enough / view_.scale_m);
     ++queries_;
-    Circle& c = circle_[count_++];
-    c.x = view_.scale_k * (view_.turn_k * k.point);
-    c.xm = view_.scale_m * (view_.turn_m * m.point);
-    c.z = view_.axis.dot(c.x - view_.point);
-    c.r = view_.across(c.x - view_.point).norm();
+    Circle c;
+    const Vec3 x = view_.scale_k * (view_.turn_k * k.point), xm = view_.scale_m * (view_.turn_m * m.point);
+    c.z = view_.axis.dot(x - view_.point);
+    c.r = view_.across(x - view_.point).norm();
     c.at = {view_.axis.dot(e), view_.across(e).norm()};
-    c.middle = c.xm;
+    c.e = e;
+    c.middle = xm;
     c.rm = 0;
     if (view_.circles) {
-      const Vec3 from = c.xm - view_.mate_point;
+      const Vec3 from = xm - view_.mate_point;
       c.middle = view_.mate_point + view_.mate_axis.dot(from) * view_.mate_axis;
-      c.rm = (c.xm - c.middle).norm();
+      c.rm = (xm - c.middle).norm();
     }
     c.k = view_.offset - view_.point + c.middle;
+    insert(c);
     const double p = view_.scale_k * k.upper + view_.scale_m * m.upper - e.dot(view_.offset);
     last_ = p;
     last_k_ = k.where;
@@ -242,10 +250,42 @@ class RingSearch {
     return true;
   }
 
-  // |d |e x b| / dphi| <= 2 tilt, e and b unit: what M's circles of radius r lose is 2 tilt half r at most,
-  // or that over the least sine of the range, times the sine.
-  bool by_circle(const Sector& sector) const { return std::min(sector.low.s, sector.high.s) > view_.tilt; }
-  double turned(double half, double r) const { return 2 * view_.tilt * half * r; }
+  // Circles are kept by the angle they were asked for: which of them are asked for between two, and some on
+  // either side.
+  struct Range {
+    int first, end;
+  };
+  Range asked_between(const Angle& low, const Angle& high) const {
+    const auto before = [](const Circle& c, const Angle& a) { return cross(c.at, a) > 0; };
+    const Circle* const begin = circle_;
+    const Circle* const end = circle_ + count_;
+    const auto first = static_cast<int>(std::lower_bound(begin, end, low, before) - begin),
+               last = static_cast<int>(std::lower_bound(begin, end, high, before) - begin);
+    return {std::max(0, first - kBeside), std::min(count_, last + kBeside)};
+  }
+  void insert(const Circle& c) {
+    int at = count_++;
+    for (; at > 0 && cross(c.at, circle_[at - 1].at) > 0; --at) circle_[at] = circle_[at - 1];
+    circle_[at] = c;
+  }
+
+  // Over the angles of a sector.
+  struct Reach {
+    double sine, cosine, across;  // least sine, largest |cosine|, least |e x b|
+  };
+  Reach reach_of(const Sector& sector) const {
+    const double sine = std::min(sector.low.s, sector.high.s),
+                 cosine = std::max(std::abs(sector.low.c), std::abs(sector.high.c));
+    return {sine, cosine, sine * view_.axis.dot(view_.mate_axis) - view_.tilt};
+  }
+  // What M's circles of radius r lose at most when the azimuth turns by `half`: with y = e.b, |dy / dphi| <=
+  // tilt, |d |e x b| / dphi| is at most 2 tilt, and |y| tilt / |e x b|.
+  double turned(const Reach& reach, double half, double r) const {
+    double rate = 2 * view_.tilt;
+    if (reach.across > 0.5 * reach.sine)
+      rate = std::min(rate, (reach.cosine + view_.tilt) * view_.tilt / reach.across);
+    return rate * half * r;
+  }
 
   // |e x b| for e at an angle in the half plane of u, and the point of M's unit circle that faces e. From
   // cross products: 1 - (e.b)^2 would lose the digits where the axes are nearly one.
@@ -259,20 +299,21 @@ class RingSearch {
     return {sine, view_.mate_axis.cross(cross) / sine};
   }
 
-  // Of all circles for azimuths within `half` of the sector's.
-  void project(const Sector& sector, double half) {
+  // Of a range of circles for azimuths within `half` of the sector's.
+  void project(const Sector& sector, double half, const Range& range) {
     const double phi = sector.phi;
     const Vec3 u = outward(phi), left = outward(phi - half), right = outward(phi + half);
-    const double least_sine = std::min(sector.low.s, sector.high.s);
-    for (int i = 0; i < count_; ++i) {
+    const Reach over = reach_of(sector);
+    const double cosine = std::cos(half);
+    for (int i = range.first; i < range.end; ++i) {
       const Circle& c = circle_[i];
       const Vec3 k = view_.across(c.k);
       double reach = std::max(k.dot(left), k.dot(right));  // the most of k.u over the interval
       if (half >= M_PI) {
         reach = k.norm();
       } else if (half > 0) {
-        const double away = std::remainder(azimuth(k) - phi, 2 * M_PI);
-        if (std::abs(away) <= half) reach = k.norm();
+        const double length = k.norm();
+        if (k.dot(u) >= cosine * length) reach = length;
       }
       meridian_[i] = {c.r - reach, c.z - view_.axis.dot(c.k)};
       if (!(c.rm > 0)) continue;
@@ -280,18 +321,83 @@ class RingSearch {
       if (!(m.sine > kNoDirection)) continue;  // the tangent plane 0
       meridian_[i].r += c.rm * m.point.dot(u);
       meridian_[i].z += c.rm * m.point.dot(view_.axis);
-      if (by_circle(sector)) meridian_[i].r -= turned(half, c.rm) / least_sine;
+      if (over.sine > view_.tilt) meridian_[i].r -= turned(over, half, c.rm) / over.sine;
     }
   }
 
   Least bound(const Sector& sector, double half, double threshold) {
-    project(sector, half);
-    const double turned =
-        by_circle(sector) ? 0 : this->turned(half, view_.scale_m * view_.m->bounding_radius);
-    Least least = least_of_greatest(meridian_, count_, sector.low, sector.high, threshold + turned + noise_,
-                                    4 * kRoundoff * pair_.reach);
+    const Range range = asked_between(sector.low, sector.high);
+    project(sector, half, range);
+    const Reach over = reach_of(sector);
+    const double turned = over.sine > view_.tilt
+                              ? 0  // circle by circle
+                              : this->turned(over, half, view_.scale_m * view_.m->bounding_radius);
+    Least least = least_of_greatest(meridian_ + range.first, range.end - range.first, sector.low, sector.high,
+                                    threshold + turned + noise_, 4 * kRoundoff * pair_.reach);
+    least.from += range.first;
+    least.to += range.first;
     least.value -= turned + noise_;
     return least;
+  }
+
+  // Least curvature radius along `v` of a body about the direction e (both in its axes), of lengths 1: for
+  // directions within `reach` of e in their plane, or, `any`, of any tangent and all directions within reach.
+  // 0 where nothing is known.
+  static double least_bend(const Shape& shape, const Vec3& e, const Vec3& v, double reach, bool any) {
+    const InnerMap& map = shape.inner_map;
+    if (map.stretches.empty()) return 0;
+    const int cell = InnerMap::cell(e);
+    const double off = (e - InnerMap::middle(cell)).norm();
+    for (int k = 0; k < static_cast<int>(kStretchCaps.size()); ++k) {
+      if (!(kChord * (off + reach) <= kStretchCaps[k])) continue;
+      const InnerStretch& s = map.stretches[cell];
+      const Vec3 f(s.along[0], s.along[1], s.along[2]);
+      const double along =
+          any ? 0 : std::max(0.0, (1 - reach * reach) * std::abs(f.dot(v)) - kChord * reach * off);
+      return s.least[k] + s.most[k] * along * along;
+    }
+    return 0;
+  }
+
+  // Balls that touch two circles from inside, wherever they and the sector's directions lie on the meridians:
+  // their centres take the circles' place. Returns the sum of the balls' radii, K's and M's.
+  double round_off(const Sector& sector, const Angle& at, const Vec3& u, const Reach& over, Circle* one,
+                   Circle* two) const {
+    const auto away = [](double x, double y) { return std::sqrt(square(x) + square(y)); };
+    double range = 0, asked = 0;
+    for (const Angle* a : {&sector.low, &sector.high})
+      range = std::max(range, away(a->c - at.c, a->s - at.s));
+    for (const Circle* c : {one, two}) asked = std::max(asked, away(c->at.c - at.c, c->at.s - at.s));
+    const Vec3 e = at.s * u + at.c * view_.axis, along = at.c * u - at.s * view_.axis;
+    const Mat3 to_k = view_.turn_k.transpose(), to_m = view_.turn_m.transpose();
+    const double of_k =
+        view_.scale_k * least_bend(*view_.k, to_k * e, to_k * along, std::max(range, asked), false);
+    for (Circle* c : {one, two}) {
+      c->r -= of_k * c->at.s;
+      c->z -= of_k * c->at.c;
+    }
+    double of_m;
+    if (view_.circles) {
+      const double y = e.dot(view_.mate_axis), across = e.cross(view_.mate_axis).norm();
+      asked = 0;
+      for (const Circle* c : {one, two})
+        asked =
+            std::max(asked, away(c->e.dot(view_.mate_axis) - y, c->e.cross(view_.mate_axis).norm() - across));
+      range += view_.tilt * sector.half / over.across;
+      of_m = view_.scale_m * least_bend(*view_.m, to_m * -e, to_m * ((view_.mate_axis - y * e) / across),
+                                        std::max(range, asked), false);
+      for (const Circle* c : {one, two}) of_m = std::min(of_m, c->rm / c->e.cross(view_.mate_axis).norm());
+      for (Circle* c : {one, two}) {
+        c->rm -= of_m * c->e.cross(view_.mate_axis).norm();
+        c->k += of_m * c->e.dot(view_.mate_axis) * view_.mate_axis;
+      }
+    } else {
+      asked = std::max((one->e - e).norm(), (two->e - e).norm());
+      range += sector.half;
+      of_m = view_.scale_m * least_bend(*view_.m, to_m * -e, along, std::max(range, asked), true);
+      for (Circle* c : {one, two}) c->k += of_m * c->e;
+    }
+    return of_k + of_m;
   }
 
   // Of one circle, or of two so weighted that nothing is to be gained by another angle: what they say of
@@ -299,19 +405,24 @@ class RingSearch {
   // the sector's angles and azimuths:
   //     F >= q cos(dalpha) + t sin(dalpha) + (f + g dalpha) dphi - bend dphi^2 / 2,  |g| <= twist,
   // since |e x b| is convex along the meridian, and by Taylor's theorem along the azimuth. The greatest of
-  // all circles is no less, and what it says of the azimuth to first order cancels at the minimum.
-  double second_order(const Sector& sector, const Least& here) const {
+  // all circles is no less, and what it says of the azimuth to first order cancels at the minimum. With y =
+  // e.b, |dy / dphi| <= tilt, |dy / dalpha| <= 1 and |e x b|^2 = 1 - y^2, the derivatives of |e x b| are
+  //     |by phi twice| <= (y'^2 + |y y''|) / |e x b| + y^2 y'^2 / |e x b|^3,
+  //     |by alpha and phi| <= tilt (1 / |e x b| + |y| |cos alpha| / |e x b| + y^2 / |e x b|^3).
+  // Where a meridian is known to bend by no less than R between the circles and in the sector (inner_map.h),
+  // the body holds the balls of that radius that touch there from inside: circles of their centres, and R
+  // more. `narrower`: the angles should be halved rather than the azimuths.
+  double second_order(const Sector& sector, const Least& here, bool* narrower) const {
+    *narrower = false;
     const Vec3 u = outward(sector.phi), across = view_.axis.cross(u);
     const double c = here.at.c, s = here.at.s;
-    // Of M's circle: |e x b|, at least this, and what it changes by with the azimuth.
-    const double least_sine = std::min(sector.low.s, sector.high.s);
+    const Reach over = reach_of(sector);
     Facing m{1, Vec3::Zero()};
-    double least = 1, turned = 0;
+    double turned = 0;
     if (view_.circles) {
       m = facing(here.at, u);
-      least = least_sine * view_.axis.dot(view_.mate_axis) - view_.tilt;
       turned = s * m.point.dot(across);
-      if (!(least > 0.5 * least_sine)) return -kFarAway;
+      if (!(over.across > 0.5 * over.sine)) return -kFarAway;
     }
     struct Slope {
       double q, t, f;
@@ -322,21 +433,39 @@ class RingSearch {
                    f = circle.rm * turned - s * circle.k.dot(across);
       return Slope{ps * s + pc * c, ps * c - pc * s, f};
     };
-    const Circle &one = circle_[here.from], &two = circle_[here.to];
+    Circle one = circle_[here.from], two = circle_[here.to];
+    const double round = round_off(sector, here.at, u, over, &one, &two);
     const Slope x = slope(one), y = slope(two);
     const double share = x.t * y.t < 0 ? y.t / (y.t - x.t) : x.q > y.q ? 1.0 : 0.0;
     const double q = share * x.q + (1 - share) * y.q, t = share * x.t + (1 - share) * y.t,
                  f = share * x.f + (1 - share) * y.f, rho = share * one.rm + (1 - share) * two.rm;
     const Vec3 k = view_.across(share * one.k + (1 - share) * two.k);
-    const double inverse = 1 / least;
-    const double bend = k.norm() + rho * view_.tilt * (1 + view_.tilt * inverse * inverse) * inverse,
-                 twist = std::abs(k.dot(across)) + rho * view_.tilt * (2 + inverse * inverse) * inverse;
-    // A chord is shorter than its angle by less than a twentieth up to a radian.
-    const auto away = [&](const Angle& a) { return 1.05 * std::hypot(a.c - c, a.s - s); };
-    const double h = sector.half, turn = std::max(away(sector.low), away(sector.high));
-    if (!(turn < 1 && q > 0)) return -kFarAway;
-    return q * (1 - 0.5 * turn * turn) - std::abs(t) * turn - (std::abs(f) + twist * turn) * h -
-           0.5 * bend * h * h - noise_;
+    const double tilt = view_.tilt, inverse = view_.circles ? 1 / over.across : 1.0,
+                 cosine = over.cosine + tilt;  // of y
+    const double h = sector.half, cube = square(cosine * inverse) * inverse, along = std::abs(k.dot(across)),
+                 facing = k.dot(u),
+                 near = h < 1 ? (facing > 0 ? facing * (1 - 0.5 * h * h) : facing) - along * h : -k.norm();
+    const double bend = -(near > 0 ? over.sine * near : near) +
+                        rho * tilt * ((tilt + cosine) * inverse + tilt * cube),
+                 twist = over.cosine * along + rho * tilt * ((1 + cosine * over.cosine) * inverse + cube);
+    // Along the angles a sine, least at an end or, where it bends upwards, in between.
+    double least = kFarAway;
+    for (const Angle* a : {&sector.low, &sector.high})
+      if (!(c * a->c + s * a->s > kWidestSecond)) return -kFarAway;
+    for (const double side : {t - kChord * twist * h, t + kChord * twist * h}) {
+      const auto at = [&](const Angle& a, double* slope) {
+        const double cd = c * a.c + s * a.s, sd = c * a.s - s * a.c;
+        *slope = side * cd - q * sd;
+        return q * cd + side * sd;
+      };
+      double first, last;
+      least = std::min({least, at(sector.low, &first), at(sector.high, &last)});
+      if (first < 0 && last > 0) least = std::min(least, -std::sqrt(q * q + side * side));
+    }
+    // Where the azimuth bends it upwards it has its least value inside.
+    const double lost = -bend * h > std::abs(f) ? -0.5 * f * f / bend : std::abs(f) * h + 0.5 * bend * h * h;
+    *narrower = q - least > lost;
+    return round + least - lost - noise_;
   }
 
   bool close(double phi) {
@@ -358,18 +487,26 @@ class RingSearch {
       sector.low = wide.low;
       sector.high = wide.high;
       const Least here = bound(sector, 0, threshold);
+      bool narrower;
+      const double second = second_order(sector, here, &narrower);
+      if (second >= threshold) {
+        proven_ = std::min(proven_, second);
+        --top;
+        continue;
+      }
       if (here.value >= best_ - kMeridianShare * tolerance_) {
-        const double second = second_order(sector, here);
-        if (second >= threshold) {
-          proven_ = std::min(proven_, second);
-          --top;
-          continue;
-        }
         if (top > kDeepestSector) return false;
-        const double half = 0.5 * sector.half;
-        const Sector other{sector.phi + half, half, sector.low, sector.high};
-        sector.phi -= half;
-        sector.half = half;
+        Sector other = sector;
+        if (narrower) {
+          Angle middle{sector.low.c + sector.high.c, sector.low.s + sector.high.s};
+          const double length = std::sqrt(square(middle.c) + square(middle.s));
+          middle = {middle.c / length, middle.s / length};
+          sector.high = other.low = middle;
+        } else {
+          sector.half = other.half = 0.5 * sector.half;
+          sector.phi -= sector.half;
+          other.phi += other.half;
+        }
         stack[top++] = other;
       } else if (!query(direction(here.at, sector.phi))) {
         return false;

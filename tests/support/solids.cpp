@@ -10,21 +10,6 @@
 namespace nurbs::test {
 namespace {
 
-// Turns surfaces into a shape about its centre of mass and the support along with it. `support` is in the
-// frame before the turn.
-Solid finish(Random& random, const std::string& name, std::vector<NurbsSurface> surfaces,
-             std::function<Vec3(const Vec3&)> support, std::vector<Vec3> normals) {
-  const Mat3 turn = random.turn().toRotationMatrix();
-  for (NurbsSurface& s : surfaces)
-    for (Vec4& p : s.points) p.head<3>() = (turn * p.head<3>()).eval();
-  Solid solid;
-  solid.shape = make_shape(name, std::move(surfaces));
-  const Vec3 center = solid.shape->mass.center;
-  solid.support = [=](const Vec3& d) -> Vec3 { return turn * support(turn.transpose() * d) - center; };
-  for (const Vec3& n : normals) solid.normals.push_back(turn * n);
-  return solid;
-}
-
 // One point of a profile: radius, height, weight.
 using Profile = std::vector<Vec3>;
 
@@ -63,11 +48,24 @@ std::function<Vec3(const Vec3&)> support_of_circles(std::vector<Vec2> circles) {
 
 Solid revolved_polyline(Random& random, const std::string& name, const std::vector<Vec2>& points,
                         double weights) {
-  return finish(random, name, {revolve(polyline(random, points, weights), 1)}, support_of_circles(points),
-                {Vec3::UnitZ(), -Vec3::UnitZ()});
+  return turned_solid(random, name, {revolve(polyline(random, points, weights), 1)},
+                      support_of_circles(points), {Vec3::UnitZ(), -Vec3::UnitZ()});
 }
 
 }  // namespace
+
+Solid turned_solid(Random& random, const std::string& name, std::vector<NurbsSurface> surfaces,
+                   std::function<Vec3(const Vec3&)> support, std::vector<Vec3> normals) {
+  const Mat3 turn = random.turn().toRotationMatrix();
+  for (NurbsSurface& s : surfaces)
+    for (Vec4& p : s.points) p.head<3>() = (turn * p.head<3>()).eval();
+  Solid solid;
+  solid.shape = make_shape(name, std::move(surfaces));
+  const Vec3 center = solid.shape->mass.center;
+  solid.support = [=](const Vec3& d) -> Vec3 { return turn * support(turn.transpose() * d) - center; };
+  for (const Vec3& n : normals) solid.normals.push_back(turn * n);
+  return solid;
+}
 
 Solid cone(Random& random, double radius, double height, double weights) {
   return revolved_polyline(random, "cone", {{0, 0}, {radius, 0}, {0, height}}, weights);
@@ -93,7 +91,7 @@ Solid capsule(Random& random, double r, double half) {
   const auto support = [=](const Vec3& d) -> Vec3 {
     return r * d.normalized() + (d[2] > 0 ? half : -half) * Vec3::UnitZ();
   };
-  return finish(random, "capsule", {revolve(profile, 2)}, support, {});
+  return turned_solid(random, "capsule", {revolve(profile, 2)}, support, {});
 }
 
 Solid lens(Random& random, double bend) {
@@ -107,7 +105,7 @@ Solid lens(Random& random, double bend) {
     if (bend * across < 1) return bend * n - (n[2] > 0 ? low : -low) * Vec3::UnitZ();
     return Vec3(n[0] / across, n[1] / across, 0);
   };
-  return finish(random, "lens", {revolve(profile, 2)}, support, {Vec3::UnitZ(), -Vec3::UnitZ()});
+  return turned_solid(random, "lens", {revolve(profile, 2)}, support, {Vec3::UnitZ(), -Vec3::UnitZ()});
 }
 
 Solid polyhedron(Random& random, int points, double squeeze, double weights) {
@@ -141,7 +139,7 @@ Solid polyhedron(Random& random, int points, double squeeze, double weights) {
     return *std::max_element(corners.begin(), corners.end(),
                              [&](const Vec3& x, const Vec3& y) { return d.dot(x) < d.dot(y); });
   };
-  return finish(random, "polyhedron", std::move(faces), support, normals);
+  return turned_solid(random, "polyhedron", std::move(faces), support, normals);
 }
 
 Solid ellipsoid_solid(const Vec3& axes) {

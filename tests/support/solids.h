@@ -20,6 +20,10 @@ struct Solid {
   std::vector<Vec3> normals;  // of flat faces and other directions worth asking, frame of the shape
 };
 
+// A body of surfaces whose support about the origin of their frame is `support`, turned by a random rotation.
+Solid turned_solid(Random& random, const std::string& name, std::vector<NurbsSurface> surfaces,
+                   std::function<Vec3(const Vec3&)> support, std::vector<Vec3> normals = {});
+
 // Each turned by a random rotation baked into the control points, the weights of straight lines scaled by up
 // to `weights` and its inverse.
 Solid cone(Random& random, double radius, double height, double weights = 1);
