@@ -1,6 +1,8 @@
 // See host_rules.h.
 #include "liggghts/host_rules.h"
 
+#include <mpi.h>
+
 #include <cstring>
 #include <string>
 
@@ -12,6 +14,7 @@
 #include "fix_mesh_surface.h"
 #include "fix_particledistribution_discrete.h"
 #include "force.h"
+#include "group.h"
 #include "lammps.h"
 #include "liggghts/fix_template_nurbs.h"
 #include "liggghts/host_error.h"
@@ -137,6 +140,27 @@ void warn_idle_mesh(LAMMPS* lmp, Fix* fix, std::set<std::string>* told) {
                 " is no wall to the particles: they go through it; name it in fix wall/nurbs mesh");
 }
 
+// The host's fix freeze takes forces and torques off, not the motion that there is: a body may be meant to go
+// on at its speed, but one that turns against its neighbours for ever is mostly forgotten.
+void warn_frozen_motion(LAMMPS* lmp, const Fix& fix, std::set<std::string>* told) {
+  if (std::strcmp(fix.style, "freeze") != 0) return;
+  const Atom& atom = *lmp->atom;
+  int mine = 0, all = 0;
+  for (int i = 0; i < atom.nlocal; ++i) {
+    if (!(atom.mask[i] & fix.groupbit)) continue;
+    bool moves = false;
+    for (int k = 0; k < 3; ++k) moves |= atom.v[i][k] != 0 || atom.omega[i][k] != 0;
+    mine += moves;
+  }
+  MPI_Allreduce(&mine, &all, 1, MPI_INT, MPI_SUM, lmp->world);
+  if (all == 0) return;
+  const std::string group = lmp->group->names[fix.igroup];
+  warn_once(lmp, told,
+            std::string("Fix freeze ") + fix.id + ": " + std::to_string(all) +
+                " of its particles go on moving as they do; to stop them say 'velocity " + group +
+                " set 0 0 0' and 'set group " + group + " omegax 0 omegay 0 omegaz 0'");
+}
+
 void check_fix(LAMMPS* lmp, Fix* fix, std::set<std::string>* told) {
   for (const Rule& rule : kRefused)
     if (starts_with(fix->style, rule.prefix))
@@ -152,6 +176,7 @@ void check_fix(LAMMPS* lmp, Fix* fix, std::set<std::string>* told) {
              std::string("Fix ") + fix->style + " " + fix->id +
                  " changes diameters as those of spheres; use 'set group .. nurbs/scale S' between runs");
   warn_idle_mesh(lmp, fix, told);
+  warn_frozen_motion(lmp, *fix, told);
   check_integrator(lmp, *fix);
   check_insertion(lmp, fix);
 }

@@ -363,6 +363,17 @@ class Warned(unittest.TestCase):
         counted = text + "fix c all massflow/mesh mesh m count once vec_side 0 0 -1\nrun 1\n"
         self.assertNotIn("is no wall", "".join(self.warnings(counted, {"m.stl": mesh})))
 
+    def test_frozen_particles_that_turn(self):
+        """The host's fix freeze leaves them their speed and spin; stopped, they stand, whatever falls on them."""
+        moving = [(1, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0), (2, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0), (3, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)]
+        for ranks in (1, 2):
+            run = deck.run_ok(DECK + "fix ice all freeze\nrun 1\nrun 1\n", files=files(moving), ranks=ranks)
+            self.assertEqual(run.screen.count("Fix freeze ice: 1 of its particles go on moving"), 1)
+        stop = "velocity all set 0 0 0\nset group all omegax 0 omegay 0 omegaz 0\nfix ice all freeze\n"
+        run = deck.run_ok(DECK + stop + "run 100\n" + DUMP, files=files(moving))
+        self.assertNotIn("go on moving", run.screen)
+        np.testing.assert_array_equal(run.dump("dump.txt")[-1][1]["z"], [atom[7] for atom in ATOMS])
+
     def test_sphere_volumes(self):
         self.assertIn("bounding spheres", "".join(self.warnings(DECK + "fix w all buoyancy level 3 dim z density 1000\nrun 1\n")))
 
