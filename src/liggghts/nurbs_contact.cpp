@@ -129,11 +129,8 @@ void warn_deep_run(LAMMPS* lmp, const nurbs::DeepContacts& mine, const std::stri
   char numbers[128];
   std::snprintf(numbers, sizeof numbers,
                 "in the run contacts were deeper than %g %% of the bounding radius, the deepest by %.3g %%",
-                100 * nurbs::DeepContacts::kDepth, 100 * all.deepest);
-  warn(FLERR, lmp,
-       user + ": " + numbers +
-           ", [11] of compute nurbs/stats counts them; such contacts need not keep energy: are they too "
-           "soft?");
+                100 * nurbs::DeepContacts::kInRun, 100 * all.deepest);
+  warn(FLERR, lmp, user + ": " + numbers + "; such contacts need not keep energy: are they too soft?");
 }
 
 bool wants_ledger(const LAMMPS* lmp) {

@@ -354,7 +354,7 @@ void ContactStages::end_step(double neighbours) {
   counts_.value[ContactCounts::neighbours] = neighbours;
   counts_.value[ContactCounts::safe] = std::max(0.0, neighbours - others);
   counts_.value[ContactCounts::deep] = deep_.count;
-  if (step_.setup) return;
+  if (step_.setup || deep_.deepest <= DeepContacts::kInRun) return;
   deep_in_run_.count = std::max(deep_in_run_.count, deep_.count);
   deep_in_run_.deepest = std::max(deep_in_run_.deepest, deep_.deepest);
 }

@@ -42,7 +42,8 @@ struct ContactCounts {
 
 // Contacts that are too deep for a penalty law, of a step, or the most and the deepest of a run's steps.
 struct DeepContacts {
-  static constexpr double kDepth = 0.1;  // of the smaller bounding radius
+  static constexpr double kDepth = 0.1;   // of the smaller bounding radius ...
+  static constexpr double kInRun = 0.15;  // ... and in a run, where flat faces under Hertz's law gain energy
   double count = 0, deepest = 0;
 };
 
