@@ -126,11 +126,13 @@ void warn_deep(LAMMPS* lmp, const nurbs::DeepContacts& mine, const std::string& 
 void warn_deep_run(LAMMPS* lmp, const nurbs::DeepContacts& mine, const std::string& user) {
   const nurbs::DeepContacts all = of_all_ranks(lmp, mine);
   if (all.count == 0) return;
-  char numbers[128];
-  std::snprintf(numbers, sizeof numbers,
-                "in the run contacts were deeper than %g %% of the bounding radius, the deepest by %.3g %%",
-                100 * nurbs::DeepContacts::kInRun, 100 * all.deepest);
-  warn(FLERR, lmp, user + ": " + numbers + "; such contacts need not keep energy: are they too soft?");
+  char words[256];
+  std::snprintf(words, sizeof words,
+                "in the run contacts were as deep as %.3g %% of the bounding radius; beyond %g %% with flat "
+                "faces, %g %% without, they need not keep energy: are they too soft?",
+                100 * all.deepest, 100 * nurbs::DeepContacts::kFlatInRun,
+                100 * nurbs::DeepContacts::kRoundInRun);
+  warn(FLERR, lmp, user + ": " + words);
 }
 
 bool wants_ledger(const LAMMPS* lmp) {

@@ -314,8 +314,13 @@ void ContactStages::count(const ContactResult& r, int a, int b) {
 void ContactStages::note_depth(int a, int b, double gap) {
   const double radius = smaller_radius(a, b);
   if (!(-gap > DeepContacts::kDepth * radius)) return;
+  const double depth = -gap / radius;
   deep_.count += share(a, b);
-  deep_.deepest = std::max(deep_.deepest, -gap / radius);
+  deep_.deepest = std::max(deep_.deepest, depth);
+  const bool flat = record(b).flat != 0 || (a >= 0 && record(a).flat != 0);
+  if (step_.setup || depth <= (flat ? DeepContacts::kFlatInRun : DeepContacts::kRoundInRun)) return;
+  deep_in_run_.count += share(a, b);
+  deep_in_run_.deepest = std::max(deep_in_run_.deepest, depth);
 }
 
 // --- stages (c) to (f)
@@ -354,9 +359,6 @@ void ContactStages::end_step(double neighbours) {
   counts_.value[ContactCounts::neighbours] = neighbours;
   counts_.value[ContactCounts::safe] = std::max(0.0, neighbours - others);
   counts_.value[ContactCounts::deep] = deep_.count;
-  if (step_.setup || deep_.deepest <= DeepContacts::kInRun) return;
-  deep_in_run_.count = std::max(deep_in_run_.count, deep_.count);
-  deep_in_run_.deepest = std::max(deep_in_run_.deepest, deep_.deepest);
 }
 
 // What the coming block's local models and laws read: more contacts than a cache holds stream from memory,

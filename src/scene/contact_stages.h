@@ -40,10 +40,11 @@ struct ContactCounts {
   void add(const ContactResult& result, double weight);
 };
 
-// Contacts that are too deep for a penalty law, of a step, or the most and the deepest of a run's steps.
+// Contacts that are too deep for a penalty law, of a step or of a run's steps.
 struct DeepContacts {
-  static constexpr double kDepth = 0.1;   // of the smaller bounding radius ...
-  static constexpr double kInRun = 0.15;  // ... and in a run, where flat faces under Hertz's law gain energy
+  static constexpr double kDepth = 0.1;  // of the smaller bounding radius
+  // In a run, where bodies with flat faces have gained energy under Hertz's law, and for others.
+  static constexpr double kFlatInRun = 0.15, kRoundInRun = 0.3;
   double count = 0, deepest = 0;
 };
 
