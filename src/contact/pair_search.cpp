@@ -256,6 +256,17 @@ class Ladder {
     return fallback(pair, have ? &best : nullptr, lowest->d, tolerance, spent);
   }
 
+  // Whether the overlap along a polished normal is the polished gap: of a body next to one much larger,
+  // normals may be right to the tolerance of the angle, and the overlap along them not.
+  static bool agrees(const PairFrame& pair, const JointSolution& s, double tolerance) {
+    const double enough = kSupportShare * tolerance;
+    const Support a = find_hull_support(*pair.a, s.normal, &s.points.on_a, enough / pair.scale_a),
+                  b = find_hull_support(*pair.b, pair.direction_on_b(s.normal), &s.points.on_b,
+                                        enough / pair.scale_b);
+    const double p = pair.scale_a * a.h + pair.scale_b * b.h - s.normal.dot(pair.offset);
+    return -p >= s.gap - tolerance;
+  }
+
   // The polytope brackets the global answer; a stationary point that lies inside its bracket is a better
   // estimate of points and normal than the polytope's own.
   ContactResult fallback(const PairFrame& pair, const JointSolution* known, const Vec3& seed,
@@ -276,11 +287,12 @@ class Ladder {
       joint = solve_joint(pair, hull.points.on_a, hull.points.on_b, tolerance, settings_.reach,
                           kPolishIterations);
       spent += joint.iterations;
-      if (joint.converged) return finish(pair, joint, joint.normal, Rung::fallback, spent);
+      if (joint.converged && agrees(pair, joint, tolerance))
+        return finish(pair, joint, joint.normal, Rung::fallback, spent);
       polished =
           joint.stationary && joint.gap <= hull.bracket.upper && joint.gap >= hull.bracket.lower - tolerance;
     }
-    if (polished) {
+    if (polished && agrees(pair, joint, tolerance)) {
       hull.points = joint.points;
       hull.bracket.direction = joint.normal;
       hull.bracket.lower = std::max(hull.bracket.lower, joint.bracket.lower);
