@@ -132,6 +132,21 @@ bool divide(const Hulls& h, bool rational, bool third, Derivatives* y) {
   return true;
 }
 
+double norm2(double x, double y) {  // lengths here are far from the range's ends
+  return std::sqrt(x * x + y * y);
+}
+
+// Equal angles of half a turn.
+const std::array<Vec2, kCubicAngles>& half_circle() {
+  static const auto circle = [] {
+    std::array<Vec2, kCubicAngles> at;
+    for (int k = 0; k < kCubicAngles; ++k)
+      at[k] = {std::cos(M_PI * k / kCubicAngles), std::sin(M_PI * k / kCubicAngles)};
+    return at;
+  }();
+  return circle;
+}
+
 // The largest third-order form C(t, t, t) = 3 t . x_ij p_i p_j + n . x_ijk p_i p_j p_k at a point, t unit, p
 // = D^-1 J' t.
 double rate_at(const BezierPatch& patch, double u, double v) {
@@ -139,13 +154,15 @@ double rate_at(const BezierPatch& patch, double u, double v) {
   const Vec3 n = j.su.cross(j.sv).normalized();
   const double e = -n.dot(j.suu), f = -n.dot(j.suv), g = -n.dot(j.svv), det = e * g - f * f;
   const double t0 = n.dot(j.suuu), t1 = n.dot(j.suuv), t2 = n.dot(j.suvv), t3 = n.dot(j.svvv);
-  const Vec3 a = n.unitOrthogonal(), b = n.cross(a);
+  const Vec3 axis = n.unitOrthogonal();
+  Eigen::Matrix<double, 2, 3> plane;
+  plane << axis.transpose(), n.cross(axis).transpose();
+  const Vec2 ju = plane * j.su, jv = plane * j.sv, uu = plane * j.suu, uv = plane * j.suv, vv = plane * j.svv;
+  const Vec2 along_u = (g * ju - f * jv) / det, along_v = (e * jv - f * ju) / det;
   double most = 0;
-  for (int k = 0; k < kCubicAngles; ++k) {
-    const double angle = M_PI * k / kCubicAngles;
-    const Vec3 t = std::cos(angle) * a + std::sin(angle) * b;
-    const double ju = j.su.dot(t), jv = j.sv.dot(t), p = (g * ju - f * jv) / det, q = (e * jv - f * ju) / det;
-    const double second = p * p * t.dot(j.suu) + 2 * p * q * t.dot(j.suv) + q * q * t.dot(j.svv);
+  for (const Vec2& t : half_circle()) {
+    const double p = along_u.dot(t), q = along_v.dot(t);
+    const double second = p * p * t.dot(uu) + 2 * p * q * t.dot(uv) + q * q * t.dot(vv);
     most = std::max(most,
                     std::abs(3 * second + p * (p * (p * t0 + 3 * q * t1) + 3 * q * q * t2) + q * q * q * t3));
   }
@@ -154,7 +171,7 @@ double rate_at(const BezierPatch& patch, double u, double v) {
 
 // Coefficient (i, j) of a net of degrees p, q, turned so that the pole is at u = 0 (a rotation of the
 // parameters: normals stay outward).
-const Vec4& turned_point(const std::vector<Vec4>& net, int p, int q, int pole, int i, int j) {
+const Vec4& turned_point(const Vec4* net, int p, int q, int pole, int i, int j) {
   const auto at = [&](int iu, int jv) -> const Vec4& { return net[iu * (q + 1) + jv]; };
   switch (pole) {
     case 1:
@@ -252,9 +269,9 @@ struct Range {
 // Of the eigenvalues, over the cell: each entry's linear part is that of one matrix, whose norm it is.
 Range eigenvalues(const FormMatrix& m) {
   const auto norm = [](double a, double b, double c) {
-    return std::abs(0.5 * (a + c)) + std::hypot(0.5 * (a - c), b);
+    return std::abs(0.5 * (a + c)) + norm2(0.5 * (a - c), b);
   };
-  const double mean = 0.5 * (m.a.c + m.c.c), split = std::hypot(0.5 * (m.a.c - m.c.c), m.b.c);
+  const double mean = 0.5 * (m.a.c + m.c.c), split = norm2(0.5 * (m.a.c - m.c.c), m.b.c);
   const double change = norm(m.a.a, m.b.a, m.c.a) + norm(m.a.b, m.b.b, m.c.b) +
                         std::sqrt(m.a.r * m.a.r + 2 * m.b.r * m.b.r + m.c.r * m.c.r);
   // Gershgorin's circles see that a ruled direction is flat however much the other one varies.
@@ -267,7 +284,11 @@ Range eigenvalues(const FormMatrix& m) {
 Stretch stretch_of(const AffineForm (&jt)[2][2], const FormMatrix& form, const AffineForm& factor,
                    const FormMatrix& w, const Mat3& axes) {
   Stretch s;
-  const double angle = 0.5 * std::atan2(2 * w.b.c, w.a.c - w.c.c), x = std::cos(angle), y = std::sin(angle);
+  // Half the angle of (w11 - w22, 2 w12), from its cosine.
+  const double difference = w.a.c - w.c.c, across = 2 * w.b.c, size = norm2(difference, across);
+  const double cosine = size > 0 ? difference / size : 1;
+  const double x = std::sqrt(std::max(0.0, 0.5 * (1 + cosine))),
+               y = std::copysign(std::sqrt(std::max(0.0, 0.5 * (1 - cosine))), across);
   const AffineForm t[2][2] = {{x * jt[0][0] + y * jt[1][0], x * jt[0][1] + y * jt[1][1]},
                               {x * jt[1][0] - y * jt[0][0], x * jt[1][1] - y * jt[0][1]}};
   const auto entry = [&](int k, int l) {
@@ -318,14 +339,8 @@ void bound_any_curvature(const AffineVector& ju, const AffineVector& jv, const F
 double largest_cubic(double c0, double c1, double c2, double c3) {
   // A trigonometric polynomial of degree 3 is at most 1 / cos(3 pi / points) times its largest value at that
   // many equal angles (Ehlich & Zeller 1964); an odd one needs half of them.
-  static const auto circle = [] {
-    std::array<Vec2, kCubicAngles> at;
-    for (int k = 0; k < kCubicAngles; ++k)
-      at[k] = {std::cos(M_PI * k / kCubicAngles), std::sin(M_PI * k / kCubicAngles)};
-    return at;
-  }();
   double most = 0;
-  for (const Vec2& q : circle) {
+  for (const Vec2& q : half_circle()) {
     const double x = q[0], y = q[1];
     most = std::max(most, std::abs(x * (x * (c0 * x + 3 * c1 * y) + 3 * c2 * y * y) + c3 * y * y * y));
   }
@@ -337,7 +352,7 @@ double largest_cubic(double c0, double c1, double c2, double c3) {
 Cell whole_patch(const std::vector<BezierPatch>& patches, int patch) {
   Cell cell;
   cell.patch = patch;
-  cell.net = patches[patch].points;
+  cell.net.assign(patches[patch].points);
   return cell;
 }
 
@@ -358,26 +373,24 @@ void set_pole(const BezierPatch& patch, int edge, Cell* cell) {
     }
 }
 
-std::pair<Cell, Cell> halve(const BezierPatch& patch, const Cell& cell, bool in_u) {
-  std::pair<Cell, Cell> halves{cell, cell};
+void halve(const BezierPatch& patch, const Cell& cell, bool in_u, Cell* first, Cell* second) {
+  *first = *second = cell;
   const int p = patch.degree_u, q = patch.degree_v;
-  halve_net(halves.first.net.data(), halves.second.net.data(), p, q, in_u);
+  halve_net(first->net.data(), second->net.data(), p, q, in_u);
   if (cell.pole >= 0)
-    halve_net(halves.first.z.data(), halves.second.z.data(), cell.pole < 2 ? p - 1 : p,
-              cell.pole < 2 ? q : q - 1, in_u);
+    halve_net(first->z.data(), second->z.data(), cell.pole < 2 ? p - 1 : p, cell.pole < 2 ? q : q - 1, in_u);
   if (in_u) {
-    halves.first.du = halves.second.du = 0.5 * cell.du;
-    halves.second.u0 += 0.5 * cell.du;
+    first->du = second->du = 0.5 * cell.du;
+    second->u0 += 0.5 * cell.du;
   } else {
-    halves.first.dv = halves.second.dv = 0.5 * cell.dv;
-    halves.second.v0 += 0.5 * cell.dv;
+    first->dv = second->dv = 0.5 * cell.dv;
+    second->v0 += 0.5 * cell.dv;
   }
-  return halves;
 }
 
 namespace {
 
-CellBounds enclose_in_frame(const BezierPatch& patch, const Cell& cell, bool with_rate, bool upright) {
+CellBounds enclose_in_frame(const BezierPatch& patch, const Cell& cell, Wanted wanted, bool upright) {
   CellBounds out;
   out.max_radius = out.rate = kInfinity;
   out.least_curvature = -kInfinity;
@@ -386,7 +399,7 @@ CellBounds enclose_in_frame(const BezierPatch& patch, const Cell& cell, bool wit
   const bool polar = cell.pole >= 0, turned = cell.pole >= 2;
   const int rows = turned ? patch.degree_v : patch.degree_u,
             columns = turned ? patch.degree_u : patch.degree_v;
-  const bool third = with_rate || polar;
+  const bool third = wanted.rate || polar;
   const double start = polar ? from_pole(cell) : 0, length_u = turned ? cell.dv : cell.du;
   const bool touches = start == 0;
   const Vec3 middle = evaluate0(patch, cell.u0 + 0.5 * cell.du, cell.v0 + 0.5 * cell.dv);
@@ -406,13 +419,13 @@ CellBounds enclose_in_frame(const BezierPatch& patch, const Cell& cell, bool wit
   const int zp = turned || !polar ? p : p - 1, zq = turned ? q - 1 : q;
   for (int i = 0; i <= rows; ++i)
     for (int j = 0; j <= columns; ++j) {
-      const Vec4& c = turned_point(cell.net, p, q, cell.pole, i, j);
+      const Vec4& c = turned_point(cell.net.data(), p, q, cell.pole, i, j);
       largest = std::max(largest, c.head<3>().lpNorm<Eigen::Infinity>());
       heaviest = std::max(heaviest, c[3]);
       if (polar) {
         weight.at(i, j) = Vec4(0, 0, 0, c[3]);
         if (i == rows) continue;
-        const Vec4& z = turned_point(cell.z, zp, zq, cell.pole, i, j);
+        const Vec4& z = turned_point(cell.z.data(), zp, zq, cell.pole, i, j);
         net.at(i, j) << frame.to * z.head<3>(), 0;
       } else {
         net.at(i, j) << frame.to * (c.head<3>() - c[3] * middle), c[3];
@@ -480,7 +493,7 @@ CellBounds enclose_in_frame(const BezierPatch& patch, const Cell& cell, bool wit
   if (!(m.z.low() > 0)) return out;
   out.regular = true;
   out.axis = axes.col(2);
-  out.cone = std::atan(std::hypot(m.x.most(), m.y.most()) / m.z.low());
+  out.cone = std::atan(norm2(m.x.most(), m.y.most()) / m.z.low());
   const AffineForm m2 = square(m.x) + square(m.y) + square(m.z);
   if (!(m2.low() > 0)) return out;
   const AffineForm length = root(m2);
@@ -499,7 +512,7 @@ CellBounds enclose_in_frame(const BezierPatch& patch, const Cell& cell, bool wit
   bound_any_curvature(ju, jv, form, {length.low(), length.high()}, &out);
   out.convex = out.least_curvature > 0;
   if (out.convex) out.max_radius = 1 / out.least_curvature;
-  const bool rated = with_rate && !(polar && touches);
+  const bool rated = wanted.rate && !(polar && touches);
   if (rated && out.convex) out.seen_rate = rate_at(patch, cell.u0 + 0.5 * cell.du, cell.v0 + 0.5 * cell.dv);
   if (!(det.low() > 0 && form.a.low() > 0)) return out;
   out.convex = true;
@@ -524,7 +537,7 @@ CellBounds enclose_in_frame(const BezierPatch& patch, const Cell& cell, bool wit
   const double shortest2 = length.low() * length.low();
   const double product = shortest2 * shortest2 / det.high() * frame.det * frame.det;
   out.min_radius = std::max({out.min_radius, radii.low * upright2, product / radii.high});
-  out.stretch = stretch_of(jt, form, factor, w, axes);
+  if (wanted.stretch) out.stretch = stretch_of(jt, form, factor, w, axes);
   if (!rated) return out;
   out.seen_rate = rate_at(patch, cell.u0 + 0.5 * cell.du, cell.v0 + 0.5 * cell.dv);
 
@@ -564,11 +577,11 @@ CellBounds enclose_in_frame(const BezierPatch& patch, const Cell& cell, bool wit
 
 }  // namespace
 
-CellBounds enclose(const BezierPatch& patch, const Cell& cell, bool with_rate) {
-  const CellBounds bounds = enclose_in_frame(patch, cell, with_rate, false);
+CellBounds enclose(const BezierPatch& patch, const Cell& cell, Wanted wanted) {
+  const CellBounds bounds = enclose_in_frame(patch, cell, wanted, false);
   if (bounds.convex || cell.pole < 0 || from_pole(cell) > 0) return bounds;
   // At a flat pole the affine normal leans anywhere; what is proven in either frame is proven.
-  CellBounds upright = enclose_in_frame(patch, cell, with_rate, true);
+  CellBounds upright = enclose_in_frame(patch, cell, wanted, true);
   return upright.convex || (upright.regular && upright.min_radius > bounds.min_radius) ? upright : bounds;
 }
 

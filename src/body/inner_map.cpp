@@ -18,10 +18,11 @@ constexpr int kCaps = static_cast<int>(kInnerCaps.size()), kStretches = static_c
 constexpr double kAround = 0.65;        // rad: the widest cap, leaves of 0.1 and a node's own reach
 constexpr double kWidestKink = 0.3;     // rad: bodies of sharper edges have next to nothing to tell
 constexpr double kLeafCone = 0.015;     // rad: leaves as narrow are not halved for their eigenvalues ...
-constexpr double kLeafTightness = 1.2;  // ... nor those that are known as well
-constexpr int kMostLeafCells = 3000;
-constexpr double kLeastShare = 0.9;  // of the least eigenvalue that a stretch keeps: the rest is its room
-constexpr double kTiltShare = 0.05;  // of a stretch given away for the tilt of its direction
+constexpr double kLeafTightness = 1.1;  // ... nor those that are known as well
+constexpr int kMostLeafCells = 9000,
+              kMostFlatCells = 24000;  // of round bodies and of those with a normal map
+constexpr double kLeastShare = 0.9;    // of the least eigenvalue that a stretch keeps: the rest is its room
+constexpr double kTiltShare = 0.05;    // of a stretch given away for the tilt of its direction
 constexpr double kCosineRoundoff = 1e-6;  // of the nodes' normals, which are kept as floats here
 constexpr float kLarge = std::numeric_limits<float>::max();
 
@@ -257,7 +258,7 @@ int InnerMap::cell(const Vec3& d) {
          cube_cell(c.b, kStretchCells);
 }
 
-InnerMap make_inner_map(const Shape& shape, SurfaceBounds* bounds) {
+InnerMap make_inner_map(const Shape& shape) {
   InnerMap map;
   if (shape.dented() || shape.joint_slack > 0 || widest_kink(shape) > kWidestKink) return map;
   const DirectionAtlas& atlas = shape.atlas;
@@ -267,9 +268,12 @@ InnerMap make_inner_map(const Shape& shape, SurfaceBounds* bounds) {
     map.nodes[i].point = atlas.point[i];
     map.nodes[i].normal = atlas.direction(i).normalized();
   }
-  if (!shape.proofs.sphere) refine_stretches(kLeafCone, kLeafTightness, kMostLeafCells, bounds);
-  NodePainter(shape, map).paint(bounds->leaves);
-  StretchPainter(shape, map).paint(bounds->leaves);
+  SurfaceBounds bounds = bound_surface(shape, shape.proofs.sphere, {false, true});
+  if (!shape.proofs.sphere)
+    refine_stretches(kLeafCone, kLeafTightness, shape.normal_map.cells > 0 ? kMostFlatCells : kMostLeafCells,
+                     &bounds);
+  NodePainter(shape, map).paint(bounds.leaves);
+  StretchPainter(shape, map).paint(bounds.leaves);
   return map;
 }
 

@@ -4,6 +4,8 @@
 #pragma once
 
 #include <array>
+#include <memory>
+#include <mutex>
 #include <vector>
 
 #include "nurbs/types.h"
@@ -11,7 +13,6 @@
 namespace nurbs {
 
 struct Shape;
-struct SurfaceBounds;
 
 // rad: within these angles of a node's normal its radii hold, and of a cell's middle its eigenvalues.
 constexpr std::array<double, 4> kInnerCaps = {0.14, 0.18, 0.27, 0.45};
@@ -47,9 +48,25 @@ struct InnerMap {
   static Vec3 middle(int cell);    // unit, at most 0.045 rad from all that lies in it
 };
 
-// Of a shape whose atlas is done. From the leaves of `bounds`, whose normals and curvatures are proven,
-// halved further; the normals between the sides of an opening joint have radius 0, as a crease has. Some ms,
-// 170 kB.
-InnerMap make_inner_map(const Shape& shape, SurfaceBounds* bounds);
+// Of a shape that is done. From leaves, whose normals and curvatures are proven; the normals between the
+// sides of an opening joint have radius 0, as a crease has. Some tens of ms, 330 kB.
+InnerMap make_inner_map(const Shape& shape);
+
+// A shape's inner map, made when it is first asked for: bodies that never overlap deeply do without. Copies
+// share it, and any thread may ask.
+class LazyInnerMap {
+ public:
+  const InnerMap& of(const Shape& shape) const {
+    std::call_once(made_->once, [&] { made_->map = make_inner_map(shape); });
+    return made_->map;
+  }
+
+ private:
+  struct Made {
+    std::once_flag once;
+    InnerMap map;
+  };
+  std::shared_ptr<Made> made_ = std::make_shared<Made>();
+};
 
 }  // namespace nurbs

@@ -115,7 +115,8 @@ NormalMap make_normal_map(const Shape& shape, SurfaceBounds* bounds) {
   map.radius.assign(6u * kNormalCells * kNormalCells, 0);
   Painter painter(shape, map);
   const int patches = static_cast<int>(shape.patches.size());
-  refine_normals(kNormalLeafAngle, kEvenRadius, kMostNormalCells + kMostCellsPerPatch * patches, bounds);
+  refine_normals(kRoundLeafAngle, kFlatLeafAngle, kEvenRadius,
+                 kMostNormalCells + kMostCellsPerPatch * patches, bounds);
   for (const Leaf& leaf : bounds->leaves) painter.paint_leaf(leaf);
   painter.paint_joints();
   for (float& radius : map.radius)  // a cell that no normal reaches: on a crease

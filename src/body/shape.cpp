@@ -267,7 +267,6 @@ void measure(Draft& draft) {
   s.joints = measure_joint_distance(s);
   s.normal_map = make_normal_map(s, &bounds);
   s.atlas = make_atlas(s, kAtlasCells);
-  s.inner_map = make_inner_map(s, &bounds);
   s.revolution = find_revolution(s.patches, s.mass.inertia / s.mass.volume, s.bounding_radius);
 }
 

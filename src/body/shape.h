@@ -123,10 +123,12 @@ struct Shape {
   JointDistance joints;                    // to kinked joints: where the patch curvatures hold for the body
   NormalMap normal_map;                    // local bounds, for bodies with flats or dents
   DirectionAtlas atlas;
-  InnerMap inner_map;     // balls inside the body over directions
+  LazyInnerMap lazy_inner_map;
   Revolution revolution;  // about an axis, if the body is one
   FlatFeatures flats;     // faces, creases and ruled lines; empty for round bodies
 
+  // Balls inside the body over directions.
+  const InnerMap& inner_map() const { return lazy_inner_map.of(*this); }
   // Whether a local maximum of d . x may be no global one.
   bool dented() const { return support_excess > kRoundoff * bounding_radius; }
 };

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numeric>
 
 #include "nurbs/tolerances.h"
 
@@ -44,10 +45,12 @@ std::vector<Cell> first_cells(const Shape& shape, const std::vector<BezierPatch>
                        : !links[edge].collapsed && smooth(low + 1 - edge % 2) ? low + 1 - edge % 2
                                                                               : -1;
       if (pole >= 0) set_pole(surface, pole, &c);
-      auto [first, second] = halve(surface, c, edge < 2);
+      Cell first, second;
+      halve(surface, c, edge < 2, &first, &second);
       c = edge % 2 ? std::move(second) : std::move(first);
       while (links[edge].collapsed && (edge < 2 ? c.du : c.dv) > kPoleStrip) {
-        auto [lower, upper] = halve(surface, c, edge < 2);
+        Cell lower, upper;
+        halve(surface, c, edge < 2, &lower, &upper);
         if (edge % 2) std::swap(lower, upper);
         cells.push_back(std::move(upper));
         c = std::move(lower);
@@ -84,13 +87,13 @@ void inherit(const CellBounds& whole, CellBounds* half) {
 // Halves of a leaf the better way: where little is known yet both ways are tried, since a needle's cells are
 // a thousand times longer than wide. A way is as good as the better half: the other one may hold what makes
 // the doubt. Where neither helps the cell is a strip that bends more than it is wide, and is cut across.
-std::pair<Leaf, Leaf> split(const BezierPatch& patch, const Leaf& leaf, bool with_rate, int* cells) {
+std::pair<Leaf, Leaf> split(const BezierPatch& patch, const Leaf& leaf, Wanted wanted, int* cells) {
   const auto halves = [&](bool in_u) {
-    auto [a, b] = halve(patch, leaf.cell, in_u);
-    std::pair<Leaf, Leaf> pair{{std::move(a), {}, {}}, {std::move(b), {}, {}}};
+    std::pair<Leaf, Leaf> pair;
+    halve(patch, leaf.cell, in_u, &pair.first.cell, &pair.second.cell);
     for (Leaf* half : {&pair.first, &pair.second}) {
       ++*cells;
-      half->bounds = enclose(patch, half->cell, with_rate);
+      half->bounds = enclose(patch, half->cell, wanted);
       inherit(leaf.bounds, &half->bounds);
     }
     return pair;
@@ -133,8 +136,9 @@ std::pair<Change, Change> even_out(BezierPatch* patch) {
 
 class Bounder {
  public:
-  explicit Bounder(const Shape& shape)
+  Bounder(const Shape& shape, Wanted wanted)
       : shape_(shape),
+        wanted_(wanted),
         patches_(static_cast<int>(shape.patches.size())),
         seen_rate_(shape.patches.size(), 0) {}
 
@@ -146,9 +150,10 @@ class Bounder {
     for (int p = 0; p < patches_; ++p)
       for (Cell& c : first_cells(shape_, out_.even, p)) {
         Leaf leaf{std::move(c), {}, {}};
-        leaf.bounds = enclose(out_.even[p], leaf.cell, wants_rate(leaf.cell));
+        leaf.bounds = enclose(out_.even[p], leaf.cell, wanted(leaf.cell));
         ++out_.cells;
-        add(std::move(leaf), 0);
+        see(leaf);
+        open_.push_back({std::move(leaf), 0});
       }
     const int most = kMostCells + kMostCellsPerPatch * patches_;
     if (!sphere_) halve_while([this](const Open& o) { return least_loose(o); }, kLeastRadiusBudget * most);
@@ -156,24 +161,31 @@ class Bounder {
     halve_while([this](const Open& o) { return o.depth < kDeepestUnproven && unproven(o); }, base);
     halve_while([this](const Open& o) { return !hollow_ && unproven(o) && bent(o); }, kConvexBudget * most);
     halve_while([this](const Open& o) { return radii_loose(o); }, std::max(most, out_.cells + most / 2));
+    if (!wanted_.rate) return leave();
     begin_rates();
     const int enough = out_.cells + kMostRateCells + kMostCellsPerPatch * patches_;
     halve_while([this](const Open& o) { return unrated(o) && rate_loose(o); }, enough);
     halve_while([this](const Open& o) { return rate_loose(o); }, enough);
+    return leave();
+  }
+
+ private:
+  SurfaceBounds leave() {
+    out_.leaves.reserve(open_.size());
     for (Open& o : open_) out_.leaves.push_back(std::move(o.leaf));
     finish();
     return std::move(out_);
   }
 
- private:
   bool wants_rate(const Cell& c) const { return with_rates_ && !in_pole_strip(shape_, c); }
+  Wanted wanted(const Cell& c) const { return {wants_rate(c), wanted_.stretch}; }
 
   // Radii come first, without rates, which cost as much again.
   void begin_rates() {
     with_rates_ = true;
     for (Open& o : open_) {
       if (!o.leaf.bounds.convex || !wants_rate(o.leaf.cell)) continue;
-      CellBounds rated = enclose(out_.even[o.leaf.cell.patch], o.leaf.cell, true);
+      CellBounds rated = enclose(out_.even[o.leaf.cell.patch], o.leaf.cell, {true, wanted_.stretch});
       inherit(o.leaf.bounds, &rated);
       o.leaf.bounds = rated;
       see_rate(o.leaf);
@@ -185,33 +197,34 @@ class Bounder {
     if (seen < kUselessRate * shape_.bounding_radius) most = std::max(most, seen);
   }
 
-  void add(Leaf leaf, int depth) {
+  void see(const Leaf& leaf) {
     const CellBounds& b = leaf.bounds;
     if (b.seen_min > 0) out_.seen_min = std::min(out_.seen_min, b.seen_min);
-    if (b.seen_curvature > 0) {
-      out_.seen_max = std::max(out_.seen_max, b.seen_max);
-    }
+    if (b.seen_curvature > 0) out_.seen_max = std::max(out_.seen_max, b.seen_max);
     if (b.seen_curvature < -kCurvatureNoise / shape_.bounding_radius) hollow_ = true;
     see_rate(leaf);
-    open_.push_back({std::move(leaf), depth});
   }
 
+  // What is not loose stays so, as what is seen can only move the aims outward: leaves are looked at once.
   template <class Loose>
   void halve_while(const Loose& loose, int most_cells) {
-    for (bool changed = true; changed && out_.cells < most_cells;) {
-      std::vector<Open> level;
-      level.swap(open_);
-      changed = false;
-      for (Open& o : level) {
-        if (out_.cells >= most_cells || o.depth >= kDeepestCell || !loose(o)) {
-          open_.push_back(std::move(o));
-          continue;
-        }
-        changed = true;
-        auto [a, b] = split(out_.even[o.leaf.cell.patch], o.leaf, wants_rate(o.leaf.cell), &out_.cells);
-        add(std::move(a), o.depth + 1);
-        add(std::move(b), o.depth + 1);
+    std::vector<int> level(open_.size()), next;
+    std::iota(level.begin(), level.end(), 0);
+    while (!level.empty() && out_.cells < most_cells) {
+      next.clear();
+      for (const int i : level) {
+        Open& o = open_[i];
+        if (out_.cells >= most_cells || o.depth >= kDeepestCell || !loose(o)) continue;
+        const int depth = o.depth + 1;
+        auto [a, b] = split(out_.even[o.leaf.cell.patch], o.leaf, wanted(o.leaf.cell), &out_.cells);
+        see(a);
+        see(b);
+        o = {std::move(a), depth};
+        next.push_back(i);
+        next.push_back(static_cast<int>(open_.size()));
+        open_.push_back({std::move(b), depth});
       }
+      level.swap(next);
     }
   }
 
@@ -291,6 +304,7 @@ class Bounder {
   }
 
   const Shape& shape_;
+  const Wanted wanted_;
   const int patches_;
   bool with_rates_ = false, sphere_ = false, hollow_ = false;
   std::vector<std::pair<Change, Change>> changes_;
@@ -318,43 +332,44 @@ bool is_flat(const CellBounds& b, double size) {
   return b.regular && !b.convex && b.least_curvature >= -noise && b.seen_curvature <= noise;
 }
 
-SurfaceBounds bound_surface(const Shape& shape, bool sphere) {
-  return Bounder(shape).run(sphere);
+SurfaceBounds bound_surface(const Shape& shape, bool sphere, Wanted wanted) {
+  return Bounder(shape, wanted).run(sphere);
 }
 
 namespace {
 
 // Halves leaves while they are loose and `spent` is below `cells`.
 template <class Loose>
-void refine(const Loose& loose, int cells, int* spent, SurfaceBounds* bounds) {
-  std::vector<Leaf> done, open = std::move(bounds->leaves);
-  while (!open.empty()) {
-    std::vector<Leaf> level;
-    level.swap(open);
-    for (Leaf& leaf : level) {
-      if (*spent >= cells || !loose(leaf.bounds) || leaf.cell.du * leaf.cell.dv < kLeastNormalCell) {
-        done.push_back(std::move(leaf));
-        continue;
-      }
-      auto [a, b] = split(bounds->even[leaf.cell.patch], leaf, false, spent);
-      open.push_back(std::move(a));
-      open.push_back(std::move(b));
+void refine(const Loose& loose, int cells, Wanted wanted, int* spent, SurfaceBounds* bounds) {
+  std::vector<Leaf>& leaves = bounds->leaves;
+  std::vector<int> level(leaves.size()), next;
+  std::iota(level.begin(), level.end(), 0);
+  while (!level.empty()) {
+    next.clear();
+    for (const int i : level) {
+      Leaf& leaf = leaves[i];
+      if (*spent >= cells || !loose(leaf.bounds) || leaf.cell.du * leaf.cell.dv < kLeastNormalCell) continue;
+      auto [a, b] = split(bounds->even[leaf.cell.patch], leaf, wanted, spent);
+      leaf = std::move(a);
+      next.push_back(i);
+      next.push_back(static_cast<int>(leaves.size()));
+      leaves.push_back(std::move(b));
     }
+    level.swap(next);
   }
-  bounds->leaves = std::move(done);
 }
 
 }  // namespace
 
-void refine_normals(double cone, double spread, int cells, SurfaceBounds* bounds) {
+void refine_normals(double round, double flat, double spread, int cells, SurfaceBounds* bounds) {
   int spent = 0;
   // What has no normals yet first: it would leave nothing of the map.
   for (const bool wide : {true, false}) {
     const auto loose = [&](const CellBounds& b) {
-      if (!b.regular || b.cone > (wide ? kNormalCap : cone)) return true;
+      if (!b.regular || b.cone > (wide ? kNormalCap : b.convex ? round : flat)) return true;
       return !wide && b.convex && b.max_radius > spread * b.seen_max;
     };
-    refine(loose, cells, &spent, bounds);
+    refine(loose, cells, {}, &spent, bounds);
   }
 }
 
@@ -363,7 +378,7 @@ void refine_stretches(double cone, double tightness, int cells, SurfaceBounds* b
   const auto loose = [&](const CellBounds& b) {
     return b.regular && b.convex && b.cone > cone && tightness * b.stretch.least < b.seen_min;
   };
-  refine(loose, cells, &spent, bounds);
+  refine(loose, cells, {false, true}, &spent, bounds);
 }
 
 }  // namespace nurbs

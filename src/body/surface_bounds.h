@@ -31,16 +31,16 @@ struct SurfaceBounds {
 // alike, until every one is proven convex, flat, or seen not to be; the radii are within kRadiusTightness of
 // ones that occur, and each leaf's rate within kRateTightness of one that occurs in it or small beside its
 // patch's; or until kMostCells are spent: bounds are then looser, and hold. Of a `sphere`, whose radii are
-// known, only convexity. Tens of ms.
-SurfaceBounds bound_surface(const Shape& shape, bool sphere = false);
+// known, only convexity. Without rates as far as the radii. Tens of ms.
+SurfaceBounds bound_surface(const Shape& shape, bool sphere = false, Wanted wanted = {true, false});
 
 // Whether a leaf has no negative curvature beyond round-off, though not all are positive: flat or ruled.
 bool is_flat(const CellBounds& bounds, double size);
 
-// Halves the leaves further until the normals of each are within `cone` (rad) of its axis and its
-// largest radius within the factor `spread` of one that occurs there, `cells` allowing: what the normal map
-// is painted with.
-void refine_normals(double cone, double spread, int cells, SurfaceBounds* bounds);
+// Halves the leaves further until the normals of each are within `round` (rad) of its axis, within `flat`
+// where it is not convex, and its largest radius within the factor `spread` of one that occurs there, `cells`
+// allowing: what the normal map is painted with.
+void refine_normals(double round, double flat, double spread, int cells, SurfaceBounds* bounds);
 
 // Halves those that are wider than `cone` while the least eigenvalue proven of them (CellBounds::stretch) is
 // not within the factor `tightness` of the one in their middle, `cells` allowing.

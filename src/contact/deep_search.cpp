@@ -98,6 +98,8 @@ class DeepSearch {
  public:
   DeepSearch(const PairFrame& pair, double tolerance)
       : pair_(pair),
+        inner_a_(pair.a->inner_map()),
+        inner_b_(pair.b->inner_map()),
         tolerance_(tolerance),
         noise_(8 * kRoundoff * pair.reach),
         widest_(pair.scale_a * pair.a->patch_curvature.max_radius +
@@ -128,20 +130,18 @@ class DeepSearch {
 
  private:
   // DirectionAtlas::nearest, of an atlas of known size.
-  static const InnerNode& nearest(const Shape& shape, int face, double a, double b) {
+  static const InnerNode& nearest(const InnerMap& map, int face, double a, double b) {
     constexpr double kHalf = 0.5 * kAtlasCells;
     const int i = static_cast<int>(a * kHalf + (kHalf + 0.5)),
               j = static_cast<int>(b * kHalf + (kHalf + 0.5));
-    return shape.inner_map.nodes[(face * (kAtlasCells + 1) + i) * (kAtlasCells + 1) + j];
+    return map.nodes[(face * (kAtlasCells + 1) + i) * (kAtlasCells + 1) + j];
   }
-  static const InnerNode& nearest(const Shape& shape, const Vec3& d) {
+  static const InnerNode& nearest(const InnerMap& map, const Vec3& d) {
     const CubePoint c = to_cube(d);
-    return nearest(shape, c.face, c.a, c.b);
+    return nearest(map, c.face, c.a, c.b);
   }
 
-  bool serves() const {
-    return !pair_.a->inner_map.nodes.empty() && !pair_.b->inner_map.nodes.empty() && widest_ < kFarAway;
-  }
+  bool serves() const { return !inner_a_.nodes.empty() && !inner_b_.nodes.empty() && widest_ < kFarAway; }
   // What cells, and caps about all minima but the least, are proven to lie above.
   double level() const { return threshold_ + margin_; }
 
@@ -180,8 +180,8 @@ class DeepSearch {
     for (int k = 0; k < caps_; ++k)
       if (corners.above(cap_[k].d, cap_[k].cosine)) return true;
     const Vec3 middle = corners.middle();
-    const InnerNode &a = nearest(*pair_.a, cell.face(), corners.a, corners.b),
-                    &b = nearest(*pair_.b, pair_.direction_on_b(middle));
+    const InnerNode &a = nearest(inner_a_, cell.face(), corners.a, corners.b),
+                    &b = nearest(inner_b_, pair_.direction_on_b(middle));
     const Radii r = radii(a, b, cap_of_depth(cell.depth()));
     const Vec3 g = pair_.scale_a * a.point - r.a * a.normal -
                    (pair_.offset + pair_.turn * (pair_.scale_b * b.point - r.b * b.normal));
@@ -192,7 +192,7 @@ class DeepSearch {
   bool excluded_by_supports(const DirectionCell& cell, const Corners& corners) {
     if (++supports_ > kMostSupports) return false;
     const Vec3 middle = corners.middle(), d = middle.normalized(), on_b = pair_.direction_on_b(d);
-    const Radii r = radii(nearest(*pair_.a, d), nearest(*pair_.b, on_b), cap_of_depth(cell.depth()));
+    const Radii r = radii(nearest(inner_a_, d), nearest(inner_b_, on_b), cap_of_depth(cell.depth()));
     const Support a = find_hull_support(*pair_.a, d, &best_.base_a,
                                         kSupportShare * tolerance_ / pair_.scale_a),
                   b = find_hull_support(*pair_.b, on_b, &best_.base_b,
@@ -262,9 +262,9 @@ class DeepSearch {
         -s.bracket.lower - kFromThreshold * tolerance_ > threshold_ ? this->level() : threshold_;
     const Vec3& d = s.bracket.direction;
     const Vec3 g = s.jet_a.at(JetLanes::kS) - s.jet_b.at(JetLanes::kS), on_b = pair_.direction_on_b(d);
-    const InnerNode &na = nearest(*pair_.a, d), &nb = nearest(*pair_.b, on_b);
+    const InnerNode &na = nearest(inner_a_, d), &nb = nearest(inner_b_, on_b);
     const int cell_a = InnerMap::cell(d), cell_b = InnerMap::cell(on_b);
-    const InnerStretch &sa = pair_.a->inner_map.stretches[cell_a], &sb = pair_.b->inner_map.stretches[cell_b];
+    const InnerStretch &sa = inner_a_.stretches[cell_a], &sb = inner_b_.stretches[cell_b];
     const auto off = [&](const Vec3& middle_a, const Vec3& middle_b) {
       return std::acos(std::min(1.0, std::min(d.dot(middle_a), on_b.dot(middle_b)))) + kCapRoundoff;
     };
@@ -378,6 +378,7 @@ class DeepSearch {
   }
 
   const PairFrame& pair_;
+  const InnerMap &inner_a_, &inner_b_;
   const double tolerance_, noise_;
   const double widest_;  // sum of the bodies' largest curvature radii
   double threshold_ = kFarAway, margin_ = 0;

@@ -344,7 +344,7 @@ class RingSearch {
   // directions within `reach` of e in their plane, or, `any`, of any tangent and all directions within reach.
   // 0 where nothing is known.
   static double least_bend(const Shape& shape, const Vec3& e, const Vec3& v, double reach, bool any) {
-    const InnerMap& map = shape.inner_map;
+    const InnerMap& map = shape.inner_map();
     if (map.stretches.empty()) return 0;
     const int cell = InnerMap::cell(e);
     const double off = (e - InnerMap::middle(cell)).norm();

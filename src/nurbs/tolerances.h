@@ -97,15 +97,17 @@ constexpr int kAtlasCells =
 constexpr int kAtlasSamples = 4;  // per patch and direction, to start the first searches from
 
 // --- normal map
-constexpr int kNormalCells = 64;           // per cube edge: cells 0.01 to 0.03 rad wide
-constexpr double kNormalMargin = 0.01;     // rad around a normal for which the map's promise holds
-constexpr double kLongRadius = 4;          // bounding radii
-constexpr double kNormalLeafAngle = 0.02;  // rad: leaves are halved until their normals are as close together
-constexpr int kMostNormalCells = 20000;    // ... and these many are enclosed, or their radii differ ...
-constexpr double kEvenRadius = 1.5;        // ... by more than this factor
-constexpr int kNormalJointSamples = 64;    // along a kinked joint
-constexpr double kNormalCap = 0.2;         // widest cap of directions painted, rad
-constexpr double kJointCapSafety = 1.5;    // on the angle between the sides of a joint, which varies along it
+constexpr int kNormalCells = 64;        // per cube edge: cells 0.01 to 0.03 rad wide
+constexpr double kNormalMargin = 0.01;  // rad around a normal for which the map's promise holds
+constexpr double kLongRadius = 4;       // bounding radii
+constexpr double kRoundLeafAngle =
+    0.035;  // rad: leaves are halved until their normals are as close together ...
+constexpr double kFlatLeafAngle = 0.02;  // ... flat and dented ones, whose radius is infinite, as these ...
+constexpr int kMostNormalCells = 20000;  // ... and these many are enclosed, or their radii differ ...
+constexpr double kEvenRadius = 2;        // ... by more than this factor
+constexpr int kNormalJointSamples = 64;  // along a kinked joint
+constexpr double kNormalCap = 0.2;       // widest cap of directions painted, rad
+constexpr double kJointCapSafety = 1.5;  // on the angle between the sides of a joint, which varies along it
 
 // --- bodies of revolution
 constexpr double kArcRoundoff = 1e-14;  // of the body's size: distance from the axis that is none

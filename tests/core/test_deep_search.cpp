@@ -3,7 +3,9 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <thread>
 #include <vector>
 
 #include "body/local_form.h"
@@ -45,10 +47,10 @@ Vec3 near(const Vec3& n, double angle, Random& random) {
 TEST(InnerMap, balls_of_every_node_bound_the_supports_around_it) {
   Random random(71);
   for (const ShapePointer& shape : bodies()) {
-    if (shape->inner_map.nodes.empty()) continue;
+    if (shape->inner_map().nodes.empty()) continue;
     double closest = 1e300;
     for (int k = 0; k < 4000; ++k) {
-      const InnerNode& node = shape->inner_map.nodes[random.below(shape->atlas.nodes())];
+      const InnerNode& node = shape->inner_map().nodes[random.below(shape->atlas.nodes())];
       const int cap = random.below(kInnerCaps.size());
       const Vec3 d = near(node.normal, kInnerCaps[cap], random);
       const double ball = d.dot(node.point) + node.radius[cap] * 0.5 * (d - node.normal).squaredNorm();
@@ -64,11 +66,11 @@ TEST(InnerMap, balls_of_every_node_bound_the_supports_around_it) {
 TEST(InnerMap, stretches_of_every_node_bound_the_curvature_around_it) {
   Random random(72);
   for (const ShapePointer& shape : bodies()) {
-    if (shape->inner_map.nodes.empty()) continue;
+    if (shape->inner_map().nodes.empty()) continue;
     double closest = 1e300;
     long pairs = 0, wide = 0;
     std::vector<Vec3> middles;
-    for (std::size_t i = 0; i < shape->inner_map.stretches.size(); ++i)
+    for (std::size_t i = 0; i < shape->inner_map().stretches.size(); ++i)
       middles.push_back(InnerMap::middle(static_cast<int>(i)));
     for (int k = 0; k < 600; ++k) {
       const int patch = random.below(static_cast<int>(shape->patches.size()));
@@ -78,10 +80,10 @@ TEST(InnerMap, stretches_of_every_node_bound_the_curvature_around_it) {
       const Vec3 v = form.normal.cross(random.direction()).normalized();
       const Vec2 along(v.dot(form.su), v.dot(form.sv));
       const double w = along.dot(form.second.inverse() * along);
-      for (std::size_t i = 0; i < shape->inner_map.stretches.size(); ++i) {
+      for (std::size_t i = 0; i < shape->inner_map().stretches.size(); ++i) {
         if (middles[i].dot(form.normal) < std::cos(kStretchCaps.back())) continue;
         const double angle = angle_between(middles[i], form.normal);
-        const InnerStretch& s = shape->inner_map.stretches[i];
+        const InnerStretch& s = shape->inner_map().stretches[i];
         const double f = s.along[0] * v[0] + s.along[1] * v[1] + s.along[2] * v[2];
         for (std::size_t cap = 0; cap < kStretchCaps.size(); ++cap) {
           if (angle > kStretchCaps[cap]) continue;
@@ -93,7 +95,7 @@ TEST(InnerMap, stretches_of_every_node_bound_the_curvature_around_it) {
         }
       }
       for (int i = 0; i < shape->atlas.nodes(); ++i) {
-        const InnerNode& node = shape->inner_map.nodes[i];
+        const InnerNode& node = shape->inner_map().nodes[i];
         if (node.normal.dot(form.normal) < std::cos(kInnerCaps.back())) continue;
         const double angle = angle_between(node.normal, form.normal);
         for (std::size_t cap = 0; cap < kInnerCaps.size(); ++cap) {
@@ -110,7 +112,19 @@ TEST(InnerMap, stretches_of_every_node_bound_the_curvature_around_it) {
 }
 
 TEST(InnerMap, promises_nothing_where_normals_jump) {
-  EXPECT_TRUE(cuboid()->inner_map.nodes.empty());
+  EXPECT_TRUE(cuboid()->inner_map().nodes.empty());
+}
+
+TEST(InnerMap, is_made_once_for_a_shape_and_its_copies) {
+  const ShapePointer shape = make_shape("once", exact_ellipsoid(Vec3(1, 0.9, 0.7)));
+  const Shape copy = *shape;
+  std::array<const InnerMap*, 4> seen{};
+  std::vector<std::thread> threads;
+  for (std::size_t k = 0; k < seen.size(); ++k)
+    threads.emplace_back([&, k] { seen[k] = k % 2 ? &copy.inner_map() : &shape->inner_map(); });
+  for (std::thread& t : threads) t.join();
+  for (const InnerMap* map : seen) EXPECT_EQ(map, seen[0]);
+  EXPECT_FALSE(seen[0]->nodes.empty());
 }
 
 // Overlaps of any depth, among them bodies on nearly one centre, where opposite directions are as good.

@@ -70,7 +70,7 @@ double rate_seen(const BezierPatch& patch, double u, double v) {
 
 // Every bound of a cell against points inside it.
 void expect_encloses(const Shape& shape, int patch, const Cell& cell, Random& random) {
-  const CellBounds b = enclose(shape.patches[patch], cell, true);
+  const CellBounds b = enclose(shape.patches[patch], cell, {true, true});
   if (!b.regular) return;
   for (int k = 0; k < 12; ++k) {
     const double u = cell.u0 + cell.du * (k == 0 ? 0.5 : random.uniform(0, 1)),
@@ -106,7 +106,8 @@ TEST(Enclosure, holds_at_every_point_of_every_cell) {
       for (int edge = 0; edge < 4; ++edge)
         if (shape->links[patch][edge].collapsed) set_pole(shape->patches[patch], edge, &cell);
       for (int depth = random.whole(4, 14); depth > 0; --depth) {
-        auto [a, b] = halve(shape->patches[patch], cell, random.below(2));
+        Cell a, b;
+        halve(shape->patches[patch], cell, random.below(2), &a, &b);
         cell = random.below(2) ? a : b;
       }
       expect_encloses(*shape, patch, cell, random);
@@ -127,12 +128,14 @@ TEST(Enclosure, turned_polar_cells_are_the_same) {
         Cell cell = whole_patch(shape->patches, static_cast<int>(p));
         set_pole(patch, edge, &cell);
         for (int k = 0; k < 4; ++k) {
-          auto [across, beyond] = halve(patch, cell, edge < 2);
+          Cell across, beyond;
+          halve(patch, cell, edge < 2, &across, &beyond);
           cell = edge % 2 ? beyond : across;
-          auto [first, second] = halve(patch, cell, edge >= 2);
+          Cell first, second;
+          halve(patch, cell, edge >= 2, &first, &second);
           cell = k % 2 ? first : second;
         }
-        const CellBounds b = enclose(patch, cell, false);
+        const CellBounds b = enclose(patch, cell, {});
         EXPECT_TRUE(b.convex);
         EXPECT_LE(b.seen_max, b.max_radius);
         EXPECT_GE(b.seen_min, b.min_radius);
@@ -299,7 +302,8 @@ TEST(Spikes, are_in_every_enclosure_and_not_in_samples) {
     const int patch = random.below(static_cast<int>(s.patches.size()));
     Cell cell = whole_patch(s.patches, patch);
     for (int depth = random.whole(4, 24); depth > 0; --depth) {
-      auto [low, high] = halve(s.patches[patch], cell, depth % 3 == 0 && random.below(2));
+      Cell low, high;
+      halve(s.patches[patch], cell, depth % 3 == 0 && random.below(2), &low, &high);
       cell = random.below(6) ? low : high;  // towards the rim
     }
     expect_encloses(s, patch, cell, random);
