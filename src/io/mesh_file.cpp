@@ -27,6 +27,19 @@ std::string read_all(const std::string& file) {
   return text;
 }
 
+// Lines as they are read here: no byte order mark, no carriage returns, lines joined that a backslash
+// continues.
+std::string plain_lines(std::string text) {
+  if (text.compare(0, 3, "\xEF\xBB\xBF") == 0) text.erase(0, 3);
+  for (size_t k = 0; k < text.size(); ++k)
+    if (text[k] == '\r') text[k] = k + 1 < text.size() && text[k + 1] == '\n' ? ' ' : '\n';
+  for (size_t at = text.find('\\'); at != std::string::npos; at = text.find('\\', at + 1)) {
+    const size_t end = text.find_first_not_of(" \t", at + 1);
+    if (end != std::string::npos && text[end] == '\n') text[at] = text[end] = ' ';
+  }
+  return text;
+}
+
 std::string lower(std::string s) {
   std::transform(s.begin(), s.end(), s.begin(), [](unsigned char c) { return std::tolower(c); });
   return s;
@@ -111,7 +124,8 @@ TriangleMesh read_binary_stl(const std::string& file, const std::string& text) {
   return mesh;
 }
 
-TriangleMesh read_ascii_stl(const std::string& file, const std::string& text) {
+TriangleMesh read_ascii_stl(const std::string& file, const std::string& raw) {
+  const std::string text = plain_lines(raw);
   Words words(file, text);
   TriangleMesh mesh;
   std::string word;
@@ -148,7 +162,8 @@ TriangleMesh read_ascii_stl(const std::string& file, const std::string& text) {
 TriangleMesh read_stl(const std::string& file, const std::string& text) {
   const bool sized =
       text.size() >= 84 && text.size() == 84 + 50 * static_cast<size_t>(little_endian(&text[80]));
-  if (!sized && lower(text.substr(0, 5)) == "solid" && text.find('\0') == std::string::npos)
+  const size_t mark = text.compare(0, 3, "\xEF\xBB\xBF") == 0 ? 3 : 0;
+  if (!sized && lower(text.substr(mark, 5)) == "solid" && text.find('\0') == std::string::npos)
     return read_ascii_stl(file, text);
   return read_binary_stl(file, text);
 }
@@ -160,7 +175,7 @@ void add_fan(TriangleMesh& mesh, const std::vector<int>& corners) {
 
 TriangleMesh read_obj(const std::string& file, const std::string& text) {
   TriangleMesh mesh;
-  std::istringstream in(text);
+  std::istringstream in(plain_lines(text));
   std::string row;
   for (long line = 1; std::getline(in, row); ++line) {
     const auto bad = [&](const std::string& what) {

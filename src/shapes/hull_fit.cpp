@@ -8,11 +8,13 @@
 #include <map>
 #include <queue>
 
+#include "body/mass_properties.h"
 #include "body/support.h"
 #include "nurbs/affine.h"
 #include "nurbs/bernstein.h"
 #include "shapes/convex_fit.h"
 #include "shapes/primitives.h"
+#include "shapes/revolved.h"
 #include "shapes/rounded_polyhedron.h"
 
 namespace nurbs {
@@ -21,6 +23,8 @@ namespace {
 // Degree and spans of the bodies tried, by number of control points.
 constexpr int kLadder[][2] = {{3, 1}, {4, 1}, {3, 2}, {4, 2}, {3, 3}, {4, 3},
                               {3, 4}, {4, 4}, {3, 6}, {4, 6}, {3, 8}};
+constexpr int kMostSpans = 8, kHopefulSpans = 3;
+constexpr double kSteepest = 2.5;      // power of the spans by which an error falls, at the most
 constexpr double kCurvatureShare = 3;  // least curvature over the tolerance, both relative
 constexpr double kLeastCurvature = 0.002, kMostCurvature = 0.1;
 constexpr int kFurther = 2;  // rungs tried beyond a body that is near enough, but not proven convex
@@ -33,6 +37,11 @@ constexpr double kFirstAim = 0.06, kAimShare = 0.6;
 constexpr double kFirstSlide = 0.05, kFreeSlide = 0.15;
 constexpr size_t kMostFaces = 60;  // of a polyhedron with rounded edges ...
 constexpr int kRoundings = 2;      // ... whose radius is found by the distance of the first one
+constexpr int kRimPoints = 96;     // of a circle, at which its distance from the hull is looked at
+constexpr double kRimCut = 0.7,
+                 kChordCut = 0.25;    // of the tolerance: what corners and a coarser profile take
+constexpr size_t kMostProfile = 400;  // corners of the hull's own profile ...
+constexpr size_t kMostCorners = 12;   // ... and of the coarser one: rounder bodies are for splines
 constexpr int kClosestSteps = 40;
 constexpr double kClosestStride = 0.3;  // parameters
 constexpr int kMostPieces = 200000;
@@ -180,6 +189,96 @@ class RayTarget {
   ConvexHull polar_;
 };
 
+// Directions about which a hull may be one of revolution: its principal axes, which are no help where two
+// moments are equal by chance, and the normals of its two largest facets.
+std::vector<Vec3> likely_axes(const ConvexHull& hull, const MassProperties& mass) {
+  const PrincipalFrame frame = principal_frame(mass.inertia / mass.volume);
+  const Mat3 axes = frame.axes.toRotationMatrix();
+  std::vector<Vec3> out = {axes.col(0), axes.col(1), axes.col(2)};
+  std::vector<Vec3> normals;  // as long as twice the areas
+  const auto& p = hull.mesh().points;
+  for (const auto& t : hull.mesh().triangles) normals.push_back((p[t[1]] - p[t[0]]).cross(p[t[2]] - p[t[0]]));
+  std::vector<Vec3> largest = normals;
+  const auto longer = [](const Vec3& a, const Vec3& b) { return a.squaredNorm() > b.squaredNorm(); };
+  const size_t few = std::min<size_t>(largest.size(), 20);
+  std::partial_sort(largest.begin(), largest.begin() + static_cast<std::ptrdiff_t>(few), largest.end(),
+                    longer);
+  std::vector<std::pair<double, Vec3>> facets;
+  for (size_t k = 0; k < few; ++k) {
+    const Vec3 n = largest[k].normalized();
+    double area = 0;
+    for (const Vec3& m : normals)
+      if (m.cross(n).norm() < 1e-5 * m.norm() && m.dot(n) > 0) area += m.norm();
+    facets.emplace_back(area, n);
+  }
+  std::sort(facets.begin(), facets.end(), [](const auto& a, const auto& b) { return a.first > b.first; });
+  for (const auto& [area, n] : facets) {
+    if (out.size() == 5) break;
+    if (out.size() == 4 && out[3].cross(n).norm() < 1e-5) continue;
+    out.push_back(n);
+  }
+  return out;
+}
+
+// The convex polygon (r, z), from the lower end of the axis up to the upper one, of a hull turned about an
+// axis through `center`.
+std::vector<Vec2> profile_about(const ConvexHull& hull, const Vec3& center, const Vec3& axis) {
+  std::vector<Vec2> all;
+  double low = 1e300, high = -1e300;
+  for (const Vec3& x : hull.mesh().points) {
+    const double z = axis.dot(x - center);
+    all.emplace_back((x - center - z * axis).norm(), z);
+    low = std::min(low, z);
+    high = std::max(high, z);
+  }
+  const double size = high - low, same = 1e-6 * size;  // as single precision leaves it
+  std::sort(all.begin(), all.end(),
+            [](const Vec2& a, const Vec2& b) { return a[1] < b[1] || (a[1] == b[1] && a[0] < b[0]); });
+  all.emplace_back(0, high);
+  // The side away from the axis of their hull (Andrew's chain).
+  std::vector<Vec2> chain = {Vec2(0, low)};
+  for (Vec2 p : all) {
+    if (p[1] - low < same) p[1] = low;
+    if (high - p[1] < same) p[1] = high;
+    if (p[0] < same) p[0] = 0;
+    while (chain.size() > 1) {
+      const Vec2 e = chain.back() - chain[chain.size() - 2], f = p - chain.back();
+      if (e[0] * f[1] - e[1] * f[0] > same * (e.norm() + f.norm())) break;
+      chain.pop_back();
+    }
+    if ((p - chain.back()).norm() > same) chain.push_back(p);
+  }
+  return chain;
+}
+
+// Corners left out, the least needed first, while none is further than `error` from the polygon.
+std::vector<Vec2> simplified(std::vector<Vec2> polygon, double error) {
+  const std::vector<Vec2> all = polygon;
+  const auto distance = [&](const Vec2& p, const std::vector<Vec2>& line) {
+    double least = 1e300;
+    for (size_t k = 1; k < line.size(); ++k) {
+      const Vec2 e = line[k] - line[k - 1];
+      const double t = std::clamp((p - line[k - 1]).dot(e) / e.squaredNorm(), 0.0, 1.0);
+      least = std::min(least, (p - line[k - 1] - t * e).norm());
+    }
+    return least;
+  };
+  while (polygon.size() > 3) {
+    size_t best = 0;
+    double least = error;
+    for (size_t k = 1; k + 1 < polygon.size(); ++k) {
+      std::vector<Vec2> shorter = polygon;
+      shorter.erase(shorter.begin() + static_cast<std::ptrdiff_t>(k));
+      double most = 0;
+      for (const Vec2& p : all) most = std::max(most, distance(p, shorter));
+      if (most <= least) least = most, best = k;
+    }
+    if (best == 0) break;
+    polygon.erase(polygon.begin() + static_cast<std::ptrdiff_t>(best));
+  }
+  return polygon;
+}
+
 Vec3 ray(int face, double u, double v) {
   return cube_direction(face, std::tan((2 * u - 1) * M_PI / 4), std::tan((2 * v - 1) * M_PI / 4))
       .normalized();
@@ -207,15 +306,18 @@ class HullFitter {
     int further = 0;
     for (const auto& [degree, spans] : kLadder) {
       if (options_.spans > 0 && spans != options_.spans) continue;
-      if (spans > 1 && options_.spans == 0 && try_polyhedron()) return best_;
+      if (spans > 1 && options_.spans == 0 && (try_revolution() || try_polyhedron())) return best_;
       if (degree == 4 && start_error_ < kFar && start_error_ > kSurelyTooCoarse * tolerance_) continue;
       if (try_rung(degree, spans, target)) return best_;
       if (best_.shape && further++ == kFurther) break;
+      if (hopeless(spans)) break;
     }
     if (best_.shape) return best_;  // its convexity is measured, not proven
-    throw ShapeError("no body of up to 1736 control points is within the tolerance of " +
-                     percent(options_.tolerance) + " of the hull; the best is within " + percent(least_) +
-                     ": raise the tolerance");
+    throw ShapeError("no body of up to " + std::to_string(most_points_) +
+                     " control points is within the tolerance of " + percent(options_.tolerance) +
+                     " of the hull; the best is within " + percent(least_) +
+                     ": raise the tolerance, or, as flat faces and sharp edges want many points, take them "
+                     "from `make` or `import`");
   }
 
  private:
@@ -236,6 +338,48 @@ class HullFitter {
     return false;
   }
 
+  // Whether not even errors that fall as a power of the spans, steeper than sharp edges let them, would do.
+  bool hopeless(int spans) const {
+    if (best_.shape || options_.spans > 0 || spans < kHopefulSpans || !(start_error_ < kFar)) return false;
+    return start_error_ * std::pow(spans / double(kMostSpans), kSteepest) > tolerance_;
+  }
+
+  // A body of revolution of few corners, as cylinders and cones are: flat faces and straight sides stay so,
+  // rims and tips are rounded.
+  bool try_revolution() {
+    if (revolution_tried_) return false;
+    revolution_tried_ = true;
+    for (const Vec3& axis : likely_axes(hull_, mass_)) {
+      std::vector<Vec2> polygon = profile_about(hull_, mass_.center, axis);
+      if (polygon.size() > kMostProfile) continue;
+      Mat3 turn;
+      turn << axis.unitOrthogonal(), axis.cross(axis.unitOrthogonal()), axis;
+      // The circles lie outside of a faceted hull by up to this, over their radius.
+      double outside = 0;
+      int vertex = 0;
+      for (const Vec2& p : polygon)
+        for (int k = 0; k < kRimPoints && p[0] > 0 && outside * p[0] <= 2 * tolerance_; ++k) {
+          const double angle = 2 * M_PI * (k + 0.3) / kRimPoints;
+          const Vec3 x = mass_.center + turn * Vec3(p[0] * std::cos(angle), p[0] * std::sin(angle), p[1]);
+          outside = std::max(outside, hull_.distance(x, outside * p[0], vertex) / p[0]);
+        }
+      double widest = 0;
+      for (const Vec2& p : polygon) widest = std::max(widest, p[0]);
+      const double left = 0.97 * tolerance_ - 0.5 * outside * widest;
+      if (!(left > 0.2 * tolerance_)) continue;
+      for (Vec2& p : polygon) p[0] *= 1 - 0.5 * outside;
+      const std::vector<Vec2> few = simplified(polygon, kChordCut * left);
+      if (few.size() > kMostCorners) continue;
+      const double cut = few.size() < polygon.size() ? kRimCut * left : left;
+      std::vector<NurbsSurface> body = revolve(rounded_profile(few, cut));
+      transform(body, turn, mass_.center);
+      const std::string kind =
+          "body of revolution, its rims rounded, " + std::to_string(body.size()) + " surfaces";
+      if (judge(std::move(body), kind, true)) return true;
+    }
+    return false;
+  }
+
   // The hull of a few faces with its edges rounded, as far as its corners allow: creases are dear to splines.
   bool try_polyhedron() {
     if (polyhedron_tried_) return false;
@@ -247,7 +391,7 @@ class HullFitter {
     try {
       for (int k = 0; k < kRoundings; ++k) {
         const auto body = make_shape("fit", rounded_polyhedron(faces, mass_.center, rounding));
-        if (k + 1 == kRoundings && judge(body->surfaces, kind)) return true;
+        if (k + 1 == kRoundings && judge(body->surfaces, kind, true)) return true;
         const HullDistance d = hull_distance(*body, hull_, 0.01 * tolerance_);
         rounding *= 0.97 * tolerance_ / d.worst();  // a corner's distance grows with it
       }
@@ -259,6 +403,7 @@ class HullFitter {
 
   bool try_rung(int degree, int spans, const RayTarget& target) {
     const SmoothCube cube(degree, spans);
+    most_points_ = std::max(most_points_, cube.count());
     const auto start = [&](int f, double u, double v) -> Vec3 {
       if (!start_.empty()) return evaluate(start_[f], u, v);
       return 0.9 * ray(f, u, v);
@@ -315,8 +460,9 @@ class HullFitter {
   }
 
   // Whether a body loads without a dent, is near enough and proven convex, with a ball that rolls inside:
-  // keeps it then, and the first one for which that can't be proven, whose contacts are dear.
-  bool judge(std::vector<NurbsSurface> surfaces, const std::string& kind) {
+  // keeps it then, and the first one for which that can't be proven, whose contacts are dear. `convex`: by
+  // construction.
+  bool judge(std::vector<NurbsSurface> surfaces, const std::string& kind, bool convex = false) {
     HullFit now;
     now.surfaces = std::move(surfaces);
     now.radius = radius_;
@@ -340,7 +486,7 @@ class HullFitter {
     say(kind + ": within " + percent(error) + radii);
     least_ = std::min(least_, error);
     if (error > options_.tolerance) return false;
-    const bool proven = now.shape->proofs.convex && now.shape->patch_curvature.min_radius > 0;
+    const bool proven = (convex || now.shape->proofs.convex) && now.shape->patch_curvature.min_radius > 0;
     if (proven || !best_.shape) best_ = std::move(now);
     return proven;
   }
@@ -354,9 +500,10 @@ class HullFitter {
   MassProperties mass_;
   Frame frame_;
   static constexpr double kFar = 1e299;
+  int most_points_ = 0;
   double radius_ = 0, tolerance_ = 0, least_ = kFar, start_error_ = kFar;
   std::vector<NurbsSurface> start_;
-  bool polyhedron_tried_ = false;
+  bool polyhedron_tried_ = false, revolution_tried_ = false;
   HullFit best_;
 };
 

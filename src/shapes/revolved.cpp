@@ -10,6 +10,10 @@
 namespace nurbs {
 namespace {
 
+constexpr double kLeastTurn = 1e-7;   // rad: corners that turn less are none
+constexpr double kWholeEdge = 0.98;   // of an edge that only one corner takes from
+constexpr double kLeastLine = 1e-12;  // of the profile: shorter ones are left out
+
 ProfileArc line(const Vec2& from, const Vec2& to) {
   return {from, 0.5 * (from + to), to, 0};
 }
@@ -119,6 +123,51 @@ NurbsSurface surface_of_revolution(const std::vector<Vec3>& segment) {
   std::vector<double> knots(2 * count, 0);
   std::fill_n(knots.begin() + static_cast<std::ptrdiff_t>(count), count, 1);
   return surface_of_revolution(static_cast<int>(count) - 1, knots, segment);
+}
+
+Profile rounded_profile(const std::vector<Vec2>& polygon, double cut) {
+  const int last = static_cast<int>(polygon.size()) - 1;
+  double size = 0;
+  for (const Vec2& p : polygon) size = std::max(size, (p - polygon[0]).norm());
+  std::vector<double> heading(last), half(last + 1);  // of edges; half the turn at each corner
+  for (int k = 0; k < last; ++k) {
+    const Vec2 edge = polygon[k + 1] - polygon[k];
+    heading[k] = std::atan2(edge[1], edge[0]);
+  }
+  half[0] = heading[0];  // the mirror image comes in at - heading
+  half[last] = M_PI - heading[last - 1];
+  for (int k = 1; k < last; ++k) half[k] = 0.5 * (heading[k] - heading[k - 1]);
+  const auto rounded = [&](int k) { return half[k] > kLeastTurn; };
+  const auto reach = [&](int k, int other) {  // along the edge to another corner
+    const double length = (polygon[k] - polygon[other]).norm();
+    return rounded(other) ? 0.5 * length : kWholeEdge * length;
+  };
+  Profile out;
+  Vec2 at = polygon[0];
+  const auto draw_line = [&](const Vec2& to) {
+    if ((to - at).norm() > kLeastLine * size) out.push_back(line(at, to));
+  };
+  for (int k = 0; k <= last; ++k) {
+    if (!rounded(k)) {
+      if (k > 0) draw_line(polygon[k]);
+      at = polygon[k];
+      continue;
+    }
+    const double room = std::min(k > 0 ? reach(k, k - 1) : 1e300, k < last ? reach(k, k + 1) : 1e300);
+    const double radius = std::min(cut / (1 / std::cos(half[k]) - 1), room / std::tan(half[k]));
+    // Polar angle of the corner's bisector, outward.
+    const double outward = k == 0 ? -M_PI / 2 : k == last ? M_PI / 2 : heading[k - 1] + half[k] - M_PI / 2;
+    const Vec2 center = polygon[k] - radius / std::cos(half[k]) * Vec2(std::cos(outward), std::sin(outward));
+    ProfileArc a =
+        arc(center, radius, k == 0 ? outward : outward - half[k], k == last ? outward : outward + half[k]);
+    if (k == 0) a.from[0] = 0, a.corner[1] = a.from[1];
+    if (k == last) a.to[0] = 0, a.corner[1] = a.to[1];
+    if (k > 0) draw_line(a.from);
+    if (k > 0 && (a.from - at).norm() <= kLeastLine * size) a.from = at;
+    out.push_back(a);
+    at = a.to;
+  }
+  return out;
 }
 
 std::vector<NurbsSurface> revolve(const Profile& profile) {

@@ -24,6 +24,11 @@ struct ProfileArc {
 };
 using Profile = std::vector<ProfileArc>;
 
+// Of a convex polygon (r, z), from the lower end of the axis up to the upper one: corners, tips on the axis
+// among them, become arcs that cut off at most `cut` of the corner, as far as the edges reach: half way where
+// both ends are rounded. Convex and smooth by construction.
+Profile rounded_profile(const std::vector<Vec2>& polygon, double cut);
+
 // One surface per arc, axis z; u runs round, v up, Su x Sv outward. Lines become flat discs, cylinders or
 // cones.
 std::vector<NurbsSurface> revolve(const Profile& profile);

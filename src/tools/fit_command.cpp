@@ -239,7 +239,12 @@ constexpr char kFitNotes[] =
     "of the\n"
     "hull's largest radius about its centre of mass, and which is proven convex where one is; its flattest "
     "places bulge\n"
-    "by what the tolerance leaves, which keeps contacts cheap.\n"
+    "by what the tolerance leaves, which keeps contacts cheap. Cylinders, cones and others of revolution "
+    "with "
+    "few edges,\n"
+    "and polyhedra of up to 60 faces, keep their flat faces and get edges as round as the tolerance allows. "
+    "Other bodies\n"
+    "with sharp edges want many points: take them from `make` or `import`.\n"
     "Example: nurbs-shape fit grain.stl --tolerance 2% -o grain.json\n";
 
 }  // namespace
@@ -276,6 +281,7 @@ Command add_simplify(CLI::App& app) {
   command->add_option("--tolerance", a->tolerance, "as 2% or 0.02 of the body's radius, default 1%")
       ->type_name("T");
   command->add_option("--patches", a->patches, "as for fit")->type_name("N");
+  command->footer("Example: nurbs-shape simplify grain.json --tolerance 8% -o coarse.json\n");
   return {command, [a] { simplify(*a); }};
 }
 

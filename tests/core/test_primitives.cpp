@@ -12,6 +12,7 @@
 #include "io/shape_file.h"
 #include "nurbs/affine.h"
 #include "shapes/primitives.h"
+#include "shapes/revolved.h"
 #include "shapes/superellipsoid.h"
 #include "support/random.h"
 
@@ -369,6 +370,55 @@ TEST(PaperParticles, touchThePlaneWhenEllipsoidsOfThatInertiaDo) {
   const auto shape = read_shape_file(kPaper[0].file);
   const double fall = kPaper[0].height + find_support(*shape, -Vec3::UnitZ()).point.z();
   EXPECT_NEAR(std::sqrt(2 * fall / 9.81), 0.0637, 2e-4);
+}
+
+// --- rounded profiles
+
+// The volume about z of a polygon (r, z).
+double cone_volume(const std::vector<Vec2>& polygon) {
+  double sum = 0;
+  for (size_t k = 1; k < polygon.size(); ++k) {
+    const double a = polygon[k - 1][0], b = polygon[k][0];
+    sum += (polygon[k][1] - polygon[k - 1][1]) * (a * a + a * b + b * b) * M_PI / 3;
+  }
+  return sum;
+}
+
+TEST(RoundedProfile, bodies_lie_within_the_cut_of_their_polygon) {
+  const std::vector<std::vector<Vec2>> polygons = {
+      {{0, -1}, {1, -1}, {1, 1}, {0, 1}},                 // cylinder
+      {{0, 0}, {1, 0}, {0, 2}},                           // cone
+      {{0, -1}, {1, 0}, {0, 1.5}},                        // double cone
+      {{0, 0}, {0.5, 0}, {1, 0.3}, {0.9, 1}, {0, 1.1}}};  // anything
+  for (const auto& polygon : polygons)
+    for (const double cut : {0.1, 0.01}) {
+      const auto body = make_shape("body", revolve(rounded_profile(polygon, cut)));
+      EXPECT_TRUE(body->smooth);
+      EXPECT_LE(body->concavity, 1e-11);  // round-off, the more the flatter
+      double far = 0;                     // of the body from a corner, most, the corners the farthest
+      for (const Vec2& corner : polygon) {
+        const Vec3 x = Vec3(corner[0], 0, corner[1]) - body->mass.center;
+        double least = 1e300;
+        for (const BezierPatch& patch : body->patches)
+          for (int i = 0; i <= 64; ++i)
+            for (int j = 0; j <= 64; ++j)
+              least = std::min(least, (evaluate0(patch, i / 64.0, j / 64.0) - x).norm());
+        far = std::max(far, least);
+      }
+      EXPECT_LE(far, 1.05 * cut + 1e-3);  // the grid's own distance
+      const double whole = cone_volume(polygon);
+      EXPECT_LT(body->mass.volume, whole * (1 + 1e-12));
+      EXPECT_GT(body->mass.volume, whole * (1 - 4 * cut));
+    }
+}
+
+TEST(RoundedProfile, of_a_cylinder_is_a_tablet) {
+  const double rim = 0.2, cut = rim * (std::sqrt(2.0) - 1);
+  const auto a = make_shape("a", revolve(rounded_profile({{0, -0.5}, {1, -0.5}, {1, 0.5}, {0, 0.5}}, cut))),
+             b = make_shape("b", tablet(1, 1, rim));
+  EXPECT_NEAR(a->mass.volume, b->mass.volume, 1e-12);
+  EXPECT_NEAR(a->bounding_radius, b->bounding_radius, 1e-6);
+  EXPECT_NEAR(a->patch_curvature.min_radius, b->patch_curvature.min_radius, 1e-9);
 }
 
 }  // namespace

@@ -39,6 +39,33 @@ def grain(seed, level, rough=0.35, axes=(1.4, 1.0, 0.7)):
     return np.exp(height)[:, None] * points * np.array(axes), faces
 
 
+def prism(sides, radius=1.0, half_height=1.0):
+    """Right prism over a regular polygon: a cylinder's mesh where there are many sides."""
+    angle = 2 * np.pi * np.arange(sides) / sides
+    ring = np.stack([radius * np.cos(angle), radius * np.sin(angle)], axis=1)
+    points = np.vstack([np.c_[ring, np.full(sides, -half_height)], np.c_[ring, np.full(sides, half_height)],
+                        [[0, 0, -half_height], [0, 0, half_height]]])
+    faces = []
+    for k in range(sides):
+        n = (k + 1) % sides
+        faces += [(k, n, sides + n), (k, sides + n, sides + k), (n, k, 2 * sides), (sides + k, sides + n, 2 * sides + 1)]
+    return points, np.array(faces)
+
+
+def cone(sides, radius=1.0, height=2.0):
+    angle = 2 * np.pi * np.arange(sides) / sides
+    points = np.vstack([np.c_[radius * np.cos(angle), radius * np.sin(angle), np.zeros(sides)], [[0, 0, 0], [0, 0, height]]])
+    following = (np.arange(sides) + 1) % sides
+    own = np.arange(sides)
+    return points, np.concatenate([np.c_[following, own, np.full(sides, sides)], np.c_[own, following, np.full(sides, sides + 1)]])
+
+
+def turned(points, seed):
+    q, r = np.linalg.qr(np.random.default_rng(seed).normal(size=(3, 3)))
+    q *= np.sign(np.linalg.det(q))
+    return points @ q.T
+
+
 def volume(points, faces):
     a, b, c = (points[faces[:, k]] for k in range(3))
     return float(np.einsum("ij,ij->i", a, np.cross(b, c)).sum() / 6)

@@ -197,6 +197,42 @@ class NurbsShape(unittest.TestCase):
         self.assertIn("make KIND [options] -o FILE\n       nurbs-shape make KIND [options] FILE\n",
                       call("make", "--help").stdout)
 
+    def test_examples_of_help_work_as_written(self):
+        import meshes
+        points, faces = meshes.grain(1, 3, rough=0.25)
+        (self.place / "grain.stl").write_bytes(meshes.binary_stl(points, faces))
+        helps = [["fit"], ["simplify"], ["info"], ["check"], ["export"], ["view"], ["import"], ["make", "pebbles"]]
+        text = call("make", "--help").stdout
+        kinds = re.findall(r"^  ([a-z-]+) {2,}", text[text.index("Subcommands:"):], re.MULTILINE)
+        helps += [["make", kind] for kind in kinds if kind != "pebbles"]
+        self.assertGreater(len(helps), 20)
+        for arguments in helps:
+            text = call(*arguments, "--help").stdout
+            examples = re.findall(r"^Example: nurbs-shape (.*?)(?: {3,}.*)?$", text, re.MULTILINE)
+            self.assertEqual(len(examples), 1, text)
+            words = examples[0].split()
+            self.assertEqual(words[:len(arguments)], arguments)
+            if arguments == ["import"]:
+                (self.place / "grain.step").rename(self.place / "part.step")
+            run = subprocess.run([PROGRAM, *words], cwd=self.place, stdout=subprocess.PIPE, stderr=subprocess.PIPE,
+                                 text=True, timeout=300)
+            self.assertEqual((run.returncode, run.stderr), (0, ""), examples[0])
+            if "-o" in words and arguments != ["make", "pebbles"]:
+                self.assertTrue((self.place / words[words.index("-o") + 1]).exists(), examples[0])
+
+    def test_info_says_what_a_contact_costs(self):
+        costs = {}
+        for kind, options in (("sphere", []), ("pebble", []), ("box", ["--axes", "1,1,1"])):
+            self.assertEqual(call("make", kind, *options, "-o", str(self.file)).returncode, 0)
+            info = call("info", str(self.file)).stdout
+            self.assertRegex(info, r"cost class +\S")
+            self.assertNotIn("unresolved", info)
+            costs[kind] = [float(x) for x in re.search(
+                r"a contact here +(\d+) ns resting, (\d+) ns turning .*, (\d+) ns cold", info).groups()]
+        self.assertLess(costs["sphere"][1], costs["pebble"][1])
+        for resting, turning, cold in (costs["sphere"], costs["pebble"]):
+            self.assertTrue(5 < resting < 2e5 and 5 < turning < 2e5 and 5 < cold < 1e6)
+
     def test_output_file_without_its_option(self):
         self.assertEqual(call("make", "ellipsoid", "--axes", "1,2,3", str(self.file)).returncode, 0)
         self.assertEqual([p.name for p in self.place.iterdir()], ["shape.json"])
