@@ -4,7 +4,6 @@
 #include <array>
 #include <cctype>
 #include <charconv>
-#include <chrono>
 #include <cmath>
 #include <cstdio>
 #include <exception>
@@ -27,6 +26,7 @@
 #include "shapes/rounded_polyhedron.h"
 #include "shapes/superellipsoid.h"
 #include "tools/command.h"
+#include "tools/contact_cost.h"
 
 namespace {
 
@@ -396,6 +396,24 @@ struct Maker {
   const char* notes = "";
 };
 
+// Options of an example of each kind, in the order of makers().
+constexpr const char* kMakeExamples[] = {
+    "--radius 0.005",
+    "--axes 0.012,0.008,0.006",
+    "--axes 0.012,0.008,0.006 --spans 2",
+    "--axes 0.012,0.008,0.006",
+    "--seed 7 --radius 0.005 --roundness 0.6 --elongation 0.8 --flatness 0.6",
+    "--radius 0.003 --length 0.01",
+    "--radius 0.004 --height 0.003 --rim 0.0005",
+    "--radius 0.005 --cap 0.008 --rim 0.0003",
+    "--radius 0.004 --blunt 0.004 --pointed 0.006",
+    "--axes 0.01,0.008,0.006 --rounding 0.001",
+    "--solid octahedron --radius 0.01 --rounding 0.001",
+    "--axes 1,1,2 --exponent 4 --tolerance 0.1%",
+    "--equatorial 0.01 --polar 0.005",
+    "--axes 0.01,0.008,0.006",
+    "--inertia 1.0,0.9,0.8,-0.04,0.02,0.09 --mass 2"};
+
 const std::vector<Maker>& makers() {
   static const Argument kRadius{"--radius", "R", "default 1"}, kAxes{"--axes", "A,B,C", "semi-axes"},
       kSpans{"--spans", "N", "of a patch in each direction, 1 to 12, default 1: more fit better"};
@@ -558,6 +576,7 @@ size_t memory(const Shape& shape) {
         sizeof s + sizeof(Vec4) * s.points.size() + sizeof(double) * (s.knots_u.size() + s.knots_v.size());
   }
   for (const BezierPatch& p : shape.patches) bytes += sizeof p + sizeof(Vec4) * p.points.size();
+  // The inner map comes with the first deep overlap.
   const size_t atlas_node = sizeof(double) + sizeof(Vec3) + sizeof(SurfacePoint);
   bytes += sizeof(float) * shape.normal_map.radius.size();
   return bytes + sizeof(shape.links[0]) * shape.links.size() + atlas_node * shape.atlas.support.size();
@@ -636,33 +655,22 @@ void print_descriptors(const Shape& shape) {
     std::printf("  axis %d           %.6g %.6g %.6g\n", k + 1, turn(0, k), turn(1, k), turn(2, k));
 }
 
-// What contacts cost, by what they spend their time in.
+// What contacts cost, and why.
 void print_cost(const Shape& shape) {
-  const auto time = [](int calls, const auto& call) {
-    const auto begin = std::chrono::steady_clock::now();
-    for (int k = 0; k < calls; ++k) call(k);
-    return 1e9 * std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count() / calls;
-  };
-  double sum = 0;
-  const size_t count = shape.patches.size();
-  const double evaluation = time(20000, [&](int k) {
-    sum += evaluate2(shape.patches[static_cast<size_t>(k) % count], 0.3, std::fmod(0.618 * k, 1.0)).suv[0];
-  });
-  const double search = time(3000, [&](int k) {
-    const double z = 2 * std::fmod(0.618034 * k, 1.0) - 1, turn = 2.4 * k, r = std::sqrt(1 - z * z);
-    sum += find_support(shape, Vec3(r * std::cos(turn), r * std::sin(turn), z)).h;
-  });
+  const ContactCost cost = measure_contact_cost(shape);
+  std::printf("cost class         %s\n", cost_class(cost).c_str());
   std::printf(
-      "cost here          %.0f ns an evaluation with second derivatives, %.0f ns a support search%s\n",
-      evaluation, search, std::isfinite(sum) ? "" : " (not finite)");
+      "  a contact here   %.0f ns resting, %.0f ns turning (1 mrad a step), %.0f ns cold, with its like\n",
+      cost.resting, cost.turning, cost.cold);
+  if (cost.unresolved > 0) std::printf("  unresolved       %d of the cold contacts\n", cost.unresolved);
   const bool sphere = shape.inner_radius >= (1 - kSphere) * shape.bounding_radius;
-  std::printf("kind               %s\n", sphere ? "sphere: proofs take the closed form"
-                                         : !shape.smooth
-                                             ? "creased: contacts on creases take the polytope method"
-                                         : shape.dented() ? "dented: bridged by the convex hull"
-                                         : std::isinf(shape.patch_curvature.max_radius)
-                                             ? "smooth with flats"
-                                             : "smooth, strictly convex: the fast path throughout");
+  std::printf(
+      "kind               %s\n",
+      sphere          ? "sphere: proofs take the closed form"
+      : !shape.smooth ? "creased: contacts on creases take the polytope method"
+      : shape.concavity > kUnmentionedDent * shape.bounding_radius ? "dented: bridged by the convex hull"
+      : std::isinf(shape.patch_curvature.max_radius)               ? "smooth with flats"
+                                                     : "smooth, strictly convex: the fast path throughout");
 }
 
 void print_form(const Shape& shape) {
@@ -707,17 +715,21 @@ CLI::App* add_make(CLI::App& app, std::vector<Options>& options) {
   command->allow_extras();
   command->formatter(std::make_shared<Help>(
       "nurbs-shape make KIND [options] -o FILE\n       nurbs-shape make KIND [options] FILE"));
+  const char* const* example = kMakeExamples;
   for (const Maker& maker : makers()) {
     CLI::App* kind = command->add_subcommand(maker.kind, maker.about);
     kind->formatter(
         std::make_shared<Help>("nurbs-shape make " + std::string(maker.kind) + " [options] -o FILE"));
-    kind->footer(maker.notes);
+    const std::string notes = maker.notes;
+    kind->footer(notes + (notes.empty() ? "" : "\n") + "Example: nurbs-shape make " + maker.kind + " " +
+                 *example++ + " -o " + maker.kind + ".json\n");
     options.emplace_back(kind, maker.options);
   }
   CLI::App* pebbles =
       command->add_subcommand("pebbles", "many random pebbles, as one distribution for a deck");
   pebbles->formatter(std::make_shared<Help>("nurbs-shape make pebbles --count N [options] -o FILE"));
-  pebbles->footer(kPebblesNotes);
+  pebbles->footer(std::string(kPebblesNotes) +
+                  "\nExample: nurbs-shape make pebbles --count 20 --seed 3 --roundness 0.4,0.7 -o gravel\n");
   options.emplace_back(pebbles, kPebblesOptions);
   return command;
 }
@@ -732,6 +744,7 @@ void run(CLI::App& app, int argc, char** argv) {
     CLI::App* command = app.add_subcommand(name, about);
     command->formatter(std::make_shared<Help>("nurbs-shape " + name + " FILE"));
     command->add_option("FILE", file, "shape file")->required();
+    command->footer("Example: nurbs-shape " + name + " grain.json\n");
     return command;
   };
   const CLI::App* describer = add_reader("info", "describes a shape");

@@ -184,8 +184,10 @@ Command add_export(CLI::App& app) {
   const auto a = std::make_shared<Arguments>();
   command->add_option("FILE", a->file, "shape file")->required();
   command
-      ->add_option("-o", a->output,
-                   "file to write: .step (exact faces), .stl, or .vtu (exact rational Bezier cells)")
+      ->add_option(
+          "-o", a->output,
+          "file to write: .step or .stp (exact faces), .stl (triangles), or .vtu (exact rational Bezier "
+          "cells)")
       ->type_name("FILE")
       ->required();
   command->add_option("--tolerance", a->tolerance, "of STL triangles, of the bounding radius, default 0.1%")
@@ -195,6 +197,7 @@ Command add_export(CLI::App& app) {
           "--unit", a->unit,
           "of STEP: the shape file's unit of length, um, mm, cm, m, in or a number of mm; default mm")
       ->type_name("U");
+  command->footer("Example: nurbs-shape export grain.json --unit m -o grain.step\n");
   return {command, [a] { export_shape(*a); }};
 }
 
@@ -204,7 +207,10 @@ Command add_view(CLI::App& app) {
   command->formatter(std::make_shared<Help>("nurbs-shape view FILE -o FILE.png|vtu"));
   const auto a = std::make_shared<Arguments>();
   command->add_option("FILE", a->file, "shape file")->required();
-  command->add_option("-o", a->output, "picture or VTU file to write")->type_name("FILE")->required();
+  command->add_option("-o", a->output, "file to write: .png (picture), or .vtu (exact rational Bezier cells)")
+      ->type_name("FILE")
+      ->required();
+  command->footer("Example: nurbs-shape view grain.json -o grain.png\n");
   return {command, [a] { view(*a); }};
 }
 
