@@ -35,11 +35,17 @@ struct Scene {
   std::vector<SurfacePoint> points;
 };
 
+constexpr int kClosedForm = -1;  // the body after the smooth ones
+
+const Body& body_of(int which) {
+  return which == kClosedForm ? closed_ellipsoid() : smooth_bodies()[which];
+}
+
 const Scene& scene(int which) {
   static std::map<int, Scene> scenes;
   const auto found = scenes.find(which);
   if (found != scenes.end()) return found->second;
-  const Body& body = smooth_bodies()[which];
+  const Body& body = body_of(which);
   Random random(11);
   Scene s{&body, {}, {}, {}};
   for (int k = 0; k < kPaths; ++k) {
@@ -364,8 +370,8 @@ class Collector : public benchmark::BenchmarkReporter {
 
 std::vector<std::string> register_all() {
   std::vector<std::string> names;
-  for (int which = 0; which < static_cast<int>(smooth_bodies().size()); ++which) {
-    const std::string body = smooth_bodies()[which].name + "/";
+  for (int which = kClosedForm; which < static_cast<int>(smooth_bodies().size()); ++which) {
+    const std::string body = body_of(which).name + "/";
     const auto add = [&](const char* kernel, auto&& f) {
       names.push_back(body + kernel);
       return benchmark::RegisterBenchmark((body + kernel).c_str(), f)->Repetitions(kBatches);

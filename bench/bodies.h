@@ -24,7 +24,10 @@ struct Body {
 };
 
 // Exact ellipsoid 1 : 0.8 : 0.6 (biquartic rational), pebble (bicubic), blocky superellipsoid of exponent 4
-// (bicubic, 54 pieces) and disc 10 : 1 (exact ellipsoid 1 : 1 : 0.1). Built once, about a second.
+// (bicubic, 54 pieces) and disc 10 : 1 (exact ellipsoid 1 : 1 : 0.1), the ellipsoids' closed forms unused.
+// Built once, about a second.
 const std::vector<Body>& smooth_bodies();
+// The first of them with its closed form.
+const Body& closed_ellipsoid();
 
 }  // namespace nurbs::bench

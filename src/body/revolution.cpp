@@ -1,7 +1,6 @@
 // The axis from the arcs of a patch, the proof from what height and radius change along them.
 #include "body/revolution.h"
 
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -16,8 +15,6 @@ namespace {
 using Real = long double;
 using Row = std::vector<Real>;
 using Point = Eigen::Matrix<Real, 3, 1>;
-
-constexpr double kSpheroidGuess = 1e-3;  // relative: how far off the moments' semi-axes may be
 
 // Line number i of a patch's control points across the arcs.
 std::vector<Vec4> line_of(const BezierPatch& patch, bool arcs_in_u, int i) {
@@ -148,97 +145,24 @@ bool guess_axis(const std::vector<BezierPatch>& patches, bool arcs_in_u, Revolut
   return largest > 0;
 }
 
-// How far points of the patch are from x^2 / a^2 + y^2 / b^2 + z^2 / b^2 = 1 in the frame (a, t, s), a
-// length: the coefficients of what is left over those of w^2.
-double off_spheroid(const BezierPatch& patch, const Mat3& frame, double a, double b) {
-  const int m = patch.degree_u, n = patch.degree_v;
-  const auto product = [&](int i, int j, int k, int l, bool weights) {
-    const Vec4 &p = patch.point(i, j), &q = patch.point(k, l);
-    if (weights) return p[3] * q[3];
-    const Vec3 x = frame.transpose() * p.head<3>(), y = frame.transpose() * q.head<3>();
-    return x[0] * y[0] / (a * a) + (x[1] * y[1] + x[2] * y[2]) / (b * b) - p[3] * q[3];
-  };
-  double most = 0;
-  for (int u = 0; u <= 2 * m; ++u)
-    for (int v = 0; v <= 2 * n; ++v) {
-      double left = 0, weight = 0;
-      for (int i = std::max(0, u - m); i <= std::min(m, u); ++i)
-        for (int j = std::max(0, v - n); j <= std::min(n, v); ++j) {
-          const double share = binomial(m, i) * binomial(m, u - i) * binomial(n, j) * binomial(n, v - j);
-          left += share * product(i, j, u - i, v - j, false);
-          weight += share * product(i, j, u - i, v - j, true);
-        }
-      most = std::max(most, std::abs(left) / weight);
-    }
-  return most * std::max(a, b);
-}
-
-// Semi-axes from the moments, along and across the axis; they lose digits where one is much longer.
-Revolution guess_spheroid(const Mat3& gyration, double* along, double* across) {
-  const Eigen::SelfAdjointEigenSolver<Mat3> solver(gyration);
-  const Vec3& moment = solver.eigenvalues();
-  const int alone = moment[1] - moment[0] < moment[2] - moment[1] ? 2 : 0, other = 2 - alone;
-  const double mean = 0.5 * (moment[1] + moment[other]);
-  *along = std::sqrt(2.5 * (2 * mean - moment[alone]));
-  *across = std::sqrt(2.5 * moment[alone]);
+// An ellipsoid with two equal semi-axes, to round-off.
+Revolution about_axis_of(const Ellipsoid& e, double size) {
   Revolution r;
-  r.axis = solver.eigenvectors().col(alone);
-  return r;
-}
-
-Mat3 frame_about(const Vec3& axis) {
-  Mat3 frame;
-  frame << axis, axis.unitOrthogonal(), axis.cross(axis.unitOrthogonal());
-  return frame;
-}
-
-// A better guess: the quadric through points of the surface, by least squares, in coordinates in which the
-// first guess is the unit sphere. Its small departure from that tilts the axis and scales the semi-axes.
-void improve(const std::vector<BezierPatch>& patches, Revolution* r, double* along, double* across) {
-  constexpr int kPoints = 4;  // per parameter
-  const Mat3 frame = frame_about(r->axis);
-  const Vec3 semi(*along, *across, *across);
-  Eigen::Matrix<double, 9, 9> normal = Eigen::Matrix<double, 9, 9>::Zero();
-  Eigen::Matrix<double, 9, 1> right = Eigen::Matrix<double, 9, 1>::Zero();
-  for (const BezierPatch& patch : patches)
-    for (int i = 0; i < kPoints; ++i)
-      for (int k = 0; k < kPoints; ++k) {
-        const Vec3 y = (frame.transpose() * evaluate0(patch, (i + 0.5) / kPoints, (k + 0.5) / kPoints))
-                           .cwiseQuotient(semi);
-        Eigen::Matrix<double, 9, 1> row;
-        row << y[0] * y[0], y[1] * y[1], y[2] * y[2], 2 * y[0] * y[1], 2 * y[0] * y[2], 2 * y[1] * y[2], y;
-        normal += row * row.transpose();
-        right += (1 - y.squaredNorm()) * row;
-      }
-  const Eigen::Matrix<double, 9, 1> off = normal.ldlt().solve(right);
-  if (!(off.cwiseAbs().maxCoeff() < kSpheroidGuess)) return;
-  // x^2 (1 + off) = 1, and products with y and z that a small turn takes away.
-  if (std::abs(*along - *across) > kSpheroidGuess * *across) {
-    const double turn = 1 / (*across / *along - *along / *across);
-    r->axis = (r->axis + turn * (off[3] * frame.col(1) + off[4] * frame.col(2))).normalized();
+  if (!e.found) return r;
+  for (int k = 0; k < 3; ++k) {
+    const double apart = std::abs(e.semi[(k + 1) % 3] - e.semi[(k + 2) % 3]);
+    if (!(apart <= kArcError * size)) continue;
+    r.found = true;
+    r.axis = e.axes.col(k);
+    r.error = 2 * (apart + e.error * size);
+    return r;
   }
-  *along /= std::sqrt(1 + off[0]);
-  *across /= std::sqrt(1 + 0.5 * (off[1] + off[2]));
-}
-
-Revolution find_spheroid(const std::vector<BezierPatch>& patches, const Mat3& gyration, double size) {
-  double along, across;
-  Revolution r = guess_spheroid(gyration, &along, &across);
-  if (!(along > 0 && across > 0)) return {};
-  for (int k = 0; k < 3; ++k) improve(patches, &r, &along, &across);
-  const Mat3 frame = frame_about(r.axis);
-  for (const BezierPatch& patch : patches) {
-    r.error = std::max(r.error, off_spheroid(patch, frame, along, across));
-    if (!(r.error <= kArcError * size)) return {};
-  }
-  r.found = true;
-  r.error *= 2;
   return r;
 }
 
 }  // namespace
 
-Revolution find_revolution(const std::vector<BezierPatch>& patches, const Mat3& gyration, double size) {
+Revolution find_revolution(const std::vector<BezierPatch>& patches, const Ellipsoid& ellipsoid, double size) {
   for (const bool arcs_in_u : {true, false}) {
     Revolution r;
     if (!guess_axis(patches, arcs_in_u, &r)) continue;
@@ -254,7 +178,7 @@ Revolution find_revolution(const std::vector<BezierPatch>& patches, const Mat3& 
     r.error *= 2;  // there and back
     return r;
   }
-  return find_spheroid(patches, gyration, size);
+  return about_axis_of(ellipsoid, size);
 }
 
 }  // namespace nurbs

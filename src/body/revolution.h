@@ -3,6 +3,7 @@
 
 #include <vector>
 
+#include "body/ellipsoid.h"
 #include "nurbs/bezier_patch.h"
 #include "nurbs/types.h"
 
@@ -16,11 +17,11 @@ struct Revolution {
   double error = 0;           // no point of the body turns out of it by more than this, a length
 };
 
-// Of a closed body with inertia over mass `gyration` about its centre of mass, the origin. Every patch must
-// lie in a plane square to the axis, or have parameter lines of one kind that are circular arcs about it,
-// which is proven from Bernstein coefficients of height and squared radius: turning about the axis is then
-// tangential to the whole surface. Or the patches must lie on one spheroid. Patches that make such a body in
-// yet other parameters are not found. `size`: bounding radius.
-Revolution find_revolution(const std::vector<BezierPatch>& patches, const Mat3& gyration, double size);
+// Of a closed body about its centre of mass, the origin, and the ellipsoid that it is, if any. Every patch
+// must lie in a plane square to the axis, or have parameter lines of one kind that are circular arcs about
+// it, which is proven from Bernstein coefficients of height and squared radius: turning about the axis is
+// then tangential to the whole surface. Or the body must be a spheroid. Patches that make such a body in yet
+// other parameters are not found. `size`: bounding radius.
+Revolution find_revolution(const std::vector<BezierPatch>& patches, const Ellipsoid& ellipsoid, double size);
 
 }  // namespace nurbs

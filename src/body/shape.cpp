@@ -267,7 +267,8 @@ void measure(Draft& draft) {
   s.joints = measure_joint_distance(s);
   s.normal_map = make_normal_map(s, &bounds);
   s.atlas = make_atlas(s, kAtlasCells);
-  s.revolution = find_revolution(s.patches, s.mass.inertia / s.mass.volume, s.bounding_radius);
+  s.ellipsoid = find_ellipsoid(s.patches, s.mass.inertia / s.mass.volume);
+  s.revolution = find_revolution(s.patches, s.ellipsoid, s.bounding_radius);
 }
 
 void check_gyration(const Mat3& given) {

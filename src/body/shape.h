@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "body/direction_atlas.h"
+#include "body/ellipsoid.h"
 #include "body/flat_faces.h"
 #include "body/inner_map.h"
 #include "body/normal_map.h"
@@ -124,6 +125,7 @@ struct Shape {
   NormalMap normal_map;                    // local bounds, for bodies with flats or dents
   DirectionAtlas atlas;
   LazyInnerMap lazy_inner_map;
+  Ellipsoid ellipsoid;    // that the body is, if it is one
   Revolution revolution;  // about an axis, if the body is one
   FlatFeatures flats;     // faces, creases and ruled lines; empty for round bodies
 

@@ -6,10 +6,25 @@
 #include "contact/sphere_search.h"
 
 namespace nurbs {
+namespace {
+
+// Of |root^-1 y| = 1 where its normal is n, y in shape axes: the surface's second fundamental form is the
+// quadric's matrix M across n over |M y| = 1 / h.
+SurfaceCurvature ellipsoid_curvature(const Particle& particle, const Vec3& outward) {
+  const Ellipsoid& e = particle.shape->ellipsoid;
+  const Mat3 axes = particle.q.toRotationMatrix() * e.axes;
+  const Mat3 m = axes * e.semi.cwiseAbs2().cwiseInverse().asDiagonal() * axes.transpose();
+  const double h = e.semi.cwiseProduct(axes.transpose() * outward).norm();
+  const Mat3 across = Mat3::Identity() - outward * outward.transpose();
+  return {h / particle.scale * (across * m * across), true};
+}
+
+}  // namespace
 
 // II in the orthonormal frame (t, s): J^-T II J^-1, with J = (lu, t.sv; 0, s.sv) from parameters to the
 // frame.
 SurfaceCurvature curvature_at(const Particle& particle, const PointMemory& point, const Vec3& outward) {
+  if (!(point.patch >= 0) && particle.shape->ellipsoid.found) return ellipsoid_curvature(particle, outward);
   if (!(point.patch >= 0)) {  // solved as a sphere, or not at all
     const Roundness round = roundness(*particle.shape);
     if (!(round.slope * round.slope < kCreaseAngle2)) return {};

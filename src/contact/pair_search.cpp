@@ -6,6 +6,7 @@
 
 #include "contact/deep_search.h"
 #include "contact/direction_search.h"
+#include "contact/ellipsoid_search.h"
 #include "contact/joint_newton.h"
 #include "contact/pair_frame.h"
 #include "contact/pair_memory.h"
@@ -64,6 +65,7 @@ class Ladder {
   // The rungs that evaluate surfaces.
   __attribute__((noinline)) void solve(ContactResult* r) {
     if (solve_spheres(a_, b_, settings_, memory_, r)) return;
+    if (solve_ellipsoids(a_, b_, settings_, memory_, r)) return;
     const bool touched = memory_.proof.contact != 0;
     const PairFrame pair(a_, b_);
     if (!touched && bounds(pair, r)) return;

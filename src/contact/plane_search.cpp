@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "contact/certificate.h"
+#include "contact/ellipsoid_search.h"
 #include "contact/pair_memory.h"
 #include "contact/pair_search.h"
 #include "contact/sphere_search.h"
@@ -85,6 +86,7 @@ class PlaneLadder {
   void solve(ContactResult* r) {
     if (!finite(particle_)) return;
     if (solve_sphere_on_plane(particle_, height_, normal_, settings_, memory_, r)) return;
+    if (solve_ellipsoid_on_plane(particle_, height_, normal_, settings_, memory_, r)) return;
     const bool touched = memory_.proof.contact != 0;
     axes_ = particle_.q.toRotationMatrix();
     d_ = axes_.transpose() * -normal_;

@@ -109,6 +109,10 @@ constexpr int kNormalJointSamples = 64;  // along a kinked joint
 constexpr double kNormalCap = 0.2;       // widest cap of directions painted, rad
 constexpr double kJointCapSafety = 1.5;  // on the angle between the sides of a joint, which varies along it
 
+// --- ellipsoids
+constexpr double kEllipsoidGuess = 1e-3;  // relative: how far off the moments' semi-axes may be
+constexpr double kEllipsoid = 1e-12;      // relative: a body this near an ellipsoid is taken as one
+
 // --- bodies of revolution
 constexpr double kArcRoundoff = 1e-14;  // of the body's size: distance from the axis that is none
 constexpr double kArcError = 1e-12;     // of it: what arcs about the axis may be off by
@@ -161,6 +165,14 @@ constexpr double kNearPole =
     1e-4;  // ratio of the tangents' lengths below which a plane's warm solve hands on
 constexpr int kWarmIterations = 4;     // 1 or 2 are usual
 constexpr int kPolishIterations = 12;  // from a cold start
+
+// --- ellipsoids in closed form
+constexpr int kEllipsoidSteps = 4;          // of Newton for a contact that goes on; 1 or 2 are usual ...
+constexpr int kEllipsoidColdSteps = 60;     // ... and from a cold start, with halvings
+constexpr double kEllipsoidTurn = 0.5;      // rad in one step
+constexpr double kEllipsoidNear = 0.1;      // rad, of Newton: the next direction may be the answer
+constexpr double kEllipsoidStalled = 1e-7;  // rad, of Newton: it is, or none is
+constexpr double kEllipsoidError = 0.25;    // of the tolerance that the bodies may be off ellipsoids, at most
 
 // --- local model
 constexpr double kLargestTurn = 0.5;       // rad; the chord that stands for the turn is then shorter by ...

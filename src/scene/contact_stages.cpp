@@ -5,6 +5,7 @@
 #include <limits>
 
 #include "contact/deep_search.h"
+#include "contact/ellipsoid_search.h"
 #include "laws/linear_law.h"
 #include "reference/cso.h"
 #include "scene/contact_results.h"
@@ -370,13 +371,23 @@ void ContactStages::prefetch(const ContactBlock& block) const {
     prefetch_lines(pool_.memory(block, 0), kBlock * pool_.memory_size() * sizeof(double));
 }
 
+namespace {
+
+// What a closed form says of kWidth contacts, and of which.
+struct Answer {
+  Triple<Wide> normal, point_a, point_b;  // from A's centre, lab
+  Wide gap, lower;
+  WideMask serves;
+};
+
+}  // namespace
+
 // Stage (c) for the contacts first to first + kWidth - 1.
-void ContactStages::serve(const ContactBlock& block, int first, Results& results) const {
+void ContactStages::serve(ContactBlock& block, int first, Results& results) const {
   const Wide unique = lanes(block, kUnique, first);
-  if (none_of(unique > 0.0)) {
-    std::memset(&results.served[first], 0, sizeof unique);
-    return;
-  }
+  std::memset(&results.served[first], 0, sizeof unique);
+  const WideMask modelled = unique > 0.0, ellipsoids = unique == kEllipsoidPair;
+  if (none_of(modelled | ellipsoids)) return;
   const double *of_a[kWidth], *of_b[kWidth];
   for (int l = 0; l < kWidth; ++l) {
     const bool used = block.used >> (first + l) & 1;
@@ -387,27 +398,52 @@ void ContactStages::serve(const ContactBlock& block, int first, Results& results
   }
   const Pose a = gather_pose(of_a), b = gather_pose(of_b);
   const Triple<Wide> offset = b.x - a.x;
-  const LocalContactOf<Wide> c = evaluate_local(
-      support_lanes(block, 0, first), support_lanes(block, 14, first), a.turn, b.turn, offset, a.free);
-  const WideMask served = serves<Wide>(c, unique, step_.settings.tolerance, smaller(a.radius, b.radius));
+  const auto put = [first](const WideMask& mask, const Wide& w, double(&to)[kBlock]) {
+    Wide old;
+    std::memcpy(&old, &to[first], sizeof old);
+    old = select(mask, w, old);
+    std::memcpy(&to[first], &old, sizeof old);
+  };
+  const auto put3 = [&](const WideMask& mask, const Triple<Wide>& w, double(&to)[3][kBlock]) {
+    put(mask, w.x, to[0]);
+    put(mask, w.y, to[1]);
+    put(mask, w.z, to[2]);
+  };
   const Wide zero{}, one = all<Wide>(1);
-  const Wide roundoff = kRoundoff * (magnitude(offset.x) + magnitude(offset.y) + magnitude(offset.z));
-  const Wide lower = c.gap - c.error - roundoff;
-  const Triple<Wide> middle = all<Wide>(0.5) * (c.point_a + c.point_b);
-  const auto put = [first](const Wide& w, double(&to)[kBlock]) { std::memcpy(&to[first], &w, sizeof w); };
-  put(c.gap, results.gap);
-  put(lower, results.lower);
-  put(c.normal.x, results.normal[0]);
-  put(c.normal.y, results.normal[1]);
-  put(c.normal.z, results.normal[2]);
-  put(middle.x, results.point[0]);
-  put(middle.y, results.point[1]);
-  put(middle.z, results.point[2]);
-  put(offset.x, results.offset[0]);
-  put(offset.y, results.offset[1]);
-  put(offset.z, results.offset[2]);
-  put(select((c.gap < 0.0) & (lower <= 0.0), one, zero), results.touching);
-  put(select(served, one, zero), results.served);
+  const auto answer = [&](const WideMask& asked, const Answer& c) {
+    put(asked, c.gap, results.gap);
+    put(asked, c.lower, results.lower);
+    put3(asked, c.normal, results.normal);
+    put3(asked, all<Wide>(0.5) * (c.point_a + c.point_b), results.point);
+    put3(asked, offset, results.offset);
+    put(asked, select((c.gap < 0.0) & (c.lower <= 0.0), one, zero), results.touching);
+    put(asked, select(c.serves, one, zero), results.served);
+  };
+  const Wide size = smaller(a.radius, b.radius);
+  if (!none_of(modelled)) {
+    const LocalContactOf<Wide> c = evaluate_local(
+        support_lanes(block, 0, first), support_lanes(block, 14, first), a.turn, b.turn, offset, a.free);
+    const Wide roundoff = kRoundoff * (magnitude(offset.x) + magnitude(offset.y) + magnitude(offset.z));
+    answer(modelled, {c.normal, c.point_a, c.point_b, c.gap, c.gap - c.error - roundoff,
+                      serves<Wide>(c, unique, step_.settings.tolerance, size)});
+  }
+  if (none_of(ellipsoids)) return;
+  EllipsoidPairOf<Wide> pair;
+  Wide* const fields = reinterpret_cast<Wide*>(&pair);
+  for (int k = 0; k < kEllipsoidPairSize; ++k) fields[k] = lanes(block, k, first);
+  const Wide noise = gap_roundoff(a.radius, b.radius, offset);
+  const FollowedOf<Wide> c =
+      follow<Wide>(pair, a.turn, b.turn, offset, a.free, step_.settings.tolerance, size, noise, ellipsoids);
+  answer(ellipsoids, {c.d, c.contact.point_a, c.contact.point_b, c.contact.gap,
+                      c.contact.lower - pair.error * (a.radius + b.radius) - noise, c.found});
+  if (step_.setup) return;
+  const Triple<Wide> change = c.d - pair.direction;
+  put(c.found, c.d.x, block.field[0]);
+  put(c.found, c.d.y, block.field[1]);
+  put(c.found, c.d.z, block.field[2]);
+  put(c.found, change.x, block.field[3]);
+  put(c.found, change.y, block.field[4]);
+  put(c.found, change.z, block.field[5]);
 }
 
 // Stage (d) for one contact.
@@ -416,7 +452,8 @@ void ContactStages::solve_lane(ContactBlock& block, int lane, Results& results) 
   PairMemory memory;
   memory.proof = *block.proof[lane];
   block.get(lane, kLocalModelSize, 10, &memory.on_a);
-  if (block.field[kUnique][lane] == kDeepProof)
+  const auto holds_more = [](double unique) { return unique == kDeepProof || unique == kEllipsoidPair; };
+  if (holds_more(block.field[kUnique][lane]))
     block.get(lane, 0, kLocalModelSize, &memory.model);
   else
     drop_model(&memory.model);
@@ -428,7 +465,7 @@ void ContactStages::solve_lane(ContactBlock& block, int lane, Results& results) 
   const std::int32_t contact = block.proof[lane]->contact;
   *block.proof[lane] = memory.proof;
   block.proof[lane]->contact = contact;
-  if (memory.model.unique > 0 || memory.model.unique == kDeepProof)
+  if (memory.model.unique > 0 || holds_more(memory.model.unique))
     block.set(lane, 0, kLocalModelSize, &memory.model);
   else
     block.field[kUnique][lane] = memory.model.unique;

@@ -214,7 +214,7 @@ class ContactStages {
   void prefetch(const ContactBlock& block) const;
   void prefetch_pair(int a, int b, const PairProof* proof) const;
   void compute_block(ContactBlock& block);
-  void serve(const ContactBlock& block, int first, Results& results) const;
+  void serve(ContactBlock& block, int first, Results& results) const;
   void solve_lane(ContactBlock& block, int lane, Results& results);
   void start_run(ContactBlock& block, int lane, const Results& results);
   void close(ContactBlock& block, int lane);

@@ -60,7 +60,7 @@ TEST_P(Forces, are_right_to_the_tolerance_on_every_rung) {
   ContactSettings settings;
   settings.tolerance = tolerance;
   settings.reach = 0;
-  for (const ShapePointer& shape : {sphere(), ellipsoid(), smooth_pebble(), disc()}) {
+  for (const ShapePointer& shape : {sphere(), ellipsoid(), closed_ellipsoid(), smooth_pebble(), disc()}) {
     Random random(31);
     std::map<Rung, double> worst;
     for (const double turn : {1e-5, 1e-4, 2e-3, 2e-2})

@@ -3,6 +3,7 @@
 
 #include "contact/pair_search.h"
 #include "shapes/primitives.h"
+#include "support/as_surface.h"
 #include "support/random.h"
 
 namespace nurbs {
@@ -61,8 +62,8 @@ TEST(LocalModel, SphereOnPlaneIsExact) {
 // scratch.
 TEST(LocalModel, BracketHoldsTheTrueGap) {
   test::Random random(5);
-  const auto first = make_shape("first", exact_ellipsoid(Vec3(1, 0.9, 0.7)));
-  const auto second = make_shape("second", exact_ellipsoid(Vec3(0.8, 0.8, 0.6)));
+  const auto first = test::as_surface(*make_shape("first", exact_ellipsoid(Vec3(1, 0.9, 0.7))));
+  const auto second = test::as_surface(*make_shape("second", exact_ellipsoid(Vec3(0.8, 0.8, 0.6))));
   int served = 0;
   for (double tolerance : {1e-4, 1e-7, 1e-10})
     for (int run = 0; run < 20; ++run) {

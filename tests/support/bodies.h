@@ -8,13 +8,18 @@
 #include "body/shape.h"
 #include "body/support.h"
 #include "shapes/primitives.h"
+#include "support/as_surface.h"
 
 namespace nurbs::test {
 
 using ShapePointer = std::shared_ptr<const Shape>;
 
+inline ShapePointer closed_ellipsoid() {  // known to be one
+  static const ShapePointer s = make_shape("closed", exact_ellipsoid(Vec3(1, 0.8, 0.6)));
+  return s;
+}
 inline ShapePointer ellipsoid() {
-  static const ShapePointer s = make_shape("ellipsoid", exact_ellipsoid(Vec3(1, 0.8, 0.6)));
+  static const ShapePointer s = as_surface(*make_shape("ellipsoid", exact_ellipsoid(Vec3(1, 0.8, 0.6))));
   return s;
 }
 inline ShapePointer sphere() {
@@ -22,7 +27,7 @@ inline ShapePointer sphere() {
   return s;
 }
 inline ShapePointer disc() {
-  static const ShapePointer s = make_shape("disc", exact_ellipsoid(Vec3(1, 1, 0.1)));
+  static const ShapePointer s = as_surface(*make_shape("disc", exact_ellipsoid(Vec3(1, 1, 0.1))));
   return s;
 }
 inline ShapePointer kinked() {  // bicubic, smooth only to a few mrad at the joints
@@ -34,7 +39,7 @@ inline ShapePointer smooth_pebble() {
   return s;
 }
 inline ShapePointer polar() {  // one patch, two poles and a seam
-  static const ShapePointer s = make_shape("polar", revolved_ellipsoid(1, 0.5));
+  static const ShapePointer s = as_surface(*make_shape("polar", revolved_ellipsoid(1, 0.5)));
   return s;
 }
 inline ShapePointer cuboid() {
@@ -43,10 +48,10 @@ inline ShapePointer cuboid() {
 }
 
 inline std::vector<ShapePointer> smooth_shapes() {
-  return {sphere(), ellipsoid(), disc(), smooth_pebble(), polar()};
+  return {sphere(), ellipsoid(), disc(), smooth_pebble(), polar(), closed_ellipsoid()};
 }
 inline std::vector<ShapePointer> all_shapes() {
-  return {sphere(), ellipsoid(), disc(), smooth_pebble(), polar(), kinked(), cuboid()};
+  return {sphere(), ellipsoid(), disc(), smooth_pebble(), polar(), closed_ellipsoid(), kinked(), cuboid()};
 }
 
 // Local maxima of d . x from starts all over the surface: the highest, and the next one elsewhere.

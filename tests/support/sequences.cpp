@@ -10,6 +10,7 @@
 #include "shapes/primitives.h"
 #include "shapes/random_pebble.h"
 #include "shapes/revolved.h"
+#include "support/as_surface.h"
 #include "support/solid_families.h"
 
 namespace nurbs::sequences {
@@ -163,6 +164,10 @@ std::vector<Actor> make_actors() {
   }));
   actors.push_back(
       closed_form("ball", exact_ellipsoid({1, 1, 1}), [](const Vec3& d) { return d.normalized(); }));
+  Actor surface = actors[actors.size() - 2];
+  surface.name = "disc, as a surface";
+  surface.solid.shape = test::as_surface(*surface.solid.shape);
+  actors.push_back(surface);
   actors.push_back(sampled("pebble", pebble(), 20));
   actors.push_back(sampled("grain", random_pebble(5, PebbleForm()), 20));
   actors.push_back(sampled("blocky 4", fitted_superellipsoid({1, 0.9, 0.8}, 4, 3), 50));

@@ -1,0 +1,29 @@
+// Bodies that are ellipsoids: found, and proven to be such, at load.
+#pragma once
+
+#include <vector>
+
+#include "nurbs/bezier_patch.h"
+#include "nurbs/types.h"
+
+namespace nurbs {
+
+// E = {x : |(axes diag(semi)^-1 axes') x| <= 1} about the centre of mass. Its support function is h(d) =
+// |root d|, met at root' root d / h, with root = axes diag(semi) axes'.
+struct Ellipsoid {
+  bool found = false;
+  Mat3 axes = Mat3::Identity();  // principal axes, columns, shape axes
+  Vec3 semi = Vec3::Zero();      // semi-axes, lengths at scale 1
+  Mat3 root = Mat3::Zero();      // symmetric
+  double error = 0;              // the body lies between (1 - error) E and (1 + error) E
+
+  double least() const { return semi.minCoeff(); }
+};
+
+// Of a closed body with inertia over mass `gyration` about its centre of mass, the origin. Proven: in
+// coordinates in which E is the unit ball, the Bernstein coefficients of |x|^2 - w^2, x and w the patch's
+// homogeneous coordinates, are small beside those of w^2, whatever the patches' parameters are. Found where
+// the error is at most kEllipsoid.
+Ellipsoid find_ellipsoid(const std::vector<BezierPatch>& patches, const Mat3& gyration);
+
+}  // namespace nurbs
