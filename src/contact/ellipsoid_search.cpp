@@ -88,15 +88,13 @@ bool descend(const Problem& q, V d, Solution* out) {
   return false;
 }
 
-// Directions to start from: where the contact would be, had it moved on as it last did; the last proof's; the
-// line of centres.
+// Directions to start from: where the contact would be, had it moved on as it last did; the line of centres.
+// Not the last proof's: when that was made depends on when the host built its lists.
 bool solve(const Problem& q, const PairMemory& memory, Solution* out) {
   if (memory.model.unique == kEllipsoidPair) {
     EllipsoidPair last;
     std::memcpy(&last, &memory.model, sizeof last);
     if (descend(q, turned(last.direction, last.change), out)) return true;
-  } else if (has_proof(memory.proof) && descend(q, triple(memory.proof.direction), out)) {
-    return true;
   }
   const double apart = norm(q.offset);
   return apart > kNoDirection * q.size && descend(q, (1 / apart) * q.offset, out);
