@@ -115,6 +115,10 @@ std::vector<std::string> describe_proofs(const Shape& shape) {
   std::vector<std::string> lines;
   if (p.sphere) {
     lines.push_back(format("proven: a sphere to %.0e of its radius", kSphere));
+  } else if (shape.ellipsoid.found) {
+    const Vec3& semi = shape.ellipsoid.semi;
+    lines.push_back(format("proven: an ellipsoid to %.0e of itself, semi-axes %.6g %.6g %.6g",
+                           shape.ellipsoid.error, semi[0], semi[1], semi[2]));
   } else if (p.convex) {
     lines.push_back(format("proven: no negative curvature inside the patches, %.3g %% flat or ruled",
                            100 * p.flat_share));

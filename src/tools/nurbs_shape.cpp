@@ -666,8 +666,9 @@ void print_cost(const Shape& shape) {
   const bool sphere = shape.inner_radius >= (1 - kSphere) * shape.bounding_radius;
   std::printf(
       "kind               %s\n",
-      sphere          ? "sphere: proofs take the closed form"
-      : !shape.smooth ? "creased: contacts on creases take the polytope method"
+      sphere                  ? "sphere: contacts take the closed form"
+      : shape.ellipsoid.found ? "ellipsoid: contacts take the closed form"
+      : !shape.smooth         ? "creased: contacts on creases take the polytope method"
       : shape.concavity > kUnmentionedDent * shape.bounding_radius ? "dented: bridged by the convex hull"
       : std::isinf(shape.patch_curvature.max_radius)               ? "smooth with flats"
                                                      : "smooth, strictly convex: the fast path throughout");
