@@ -19,7 +19,7 @@ namespace nurbs {
 // A contact as it travels between ranks and into restarts: plain doubles. Curvature tensors of both bodies at
 // the contact are the inverses of model.a's and model.b's W where model.unique > 0.
 struct ContactRecord {
-  LocalModel model;
+  LocalModel model;        // or what stands in its place: EllipsoidPair, DeepProof
   PointMemory on_a, on_b;  // of the last solve
   ContactState state;      // of the law
   double torque[3];        // of the law beside its force, on B, lab axes

@@ -1,7 +1,7 @@
 // A time step of all contacts of one kind (pairs of bodies, or bodies and a wall), in stages over arrays:
 //   (a) per body, once: scene/bodies.h
 //   (b) budgets: neighbours that cannot have come together since they were proven apart
-//   (c) local models of all contacts          (eight side by side)
+//   (c) local models of all contacts, closed forms of ellipsoids (eight side by side)
 //   (d) solves for the rest: the contact search, one pair at a time
 //   (e) the law                               (eight side by side)
 //   (f) sums of forces, independent of the order of the pairs
