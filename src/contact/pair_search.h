@@ -14,7 +14,8 @@ constexpr int kPairMemorySize = 54;
 // sphere_search.h, ellipsoid_search.h); the direction atlases (80 ns); the local model (65 ns);
 // Newton from the last contact (0.25 us, 0.7 us where a deep pair's proof lasts); a cold start (2 us); the
 // search over directions of deep pairs (10 us); the polytope (70 us and more). A pair that touched last time
-// begins at the local model. Neither throws nor allocates; always returns a bracket.
+// begins at the local model. Neither throws nor allocates, but for a shape's inner map at its first deep
+// overlap; always returns a bracket.
 //
 // The overlap is the global minimum of p(d) over all directions, however deep. As such it changes by no more
 // than the bodies' relative translation, and under a turn by no more than the way of the outermost point:
