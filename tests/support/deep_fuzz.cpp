@@ -11,6 +11,7 @@
 #include "shapes/random_pebble.h"
 #include "shapes/revolved.h"
 #include "shapes/rounded_polyhedron.h"
+#include "support/least_overlap.h"
 #include "support/surface_cloud.h"
 
 namespace nurbs::deep_fuzz {
@@ -27,34 +28,6 @@ namespace {
 
 // --- bodies
 // ----------------------------------------------------------------------------------------------------
-
-double sign_of(double x) {
-  return x < 0 ? -1 : 1;
-}
-
-// Of a disc of radius r and half thickness h, rounded by a ball.
-Vec3 disc_support(const Vec3& d, double r, double h, double ball) {
-  const double across = std::hypot(d[0], d[1]);
-  Vec3 x(0, 0, sign_of(d[2]) * h);
-  if (across > 0) x.head<2>() = r / across * d.head<2>();
-  return x + ball * d.normalized();
-}
-Vec3 box_support(const Vec3& d, const Vec3& half, double ball) {
-  Vec3 x = ball * d.normalized();
-  for (int k = 0; k < 3; ++k) x[k] += sign_of(d[k]) * half[k];
-  return x;
-}
-Vec3 ellipsoid_support(const Vec3& d, const Vec3& axes) {
-  const Vec3 y = axes.cwiseProduct(d);
-  return axes.cwiseProduct(y) / y.norm();
-}
-
-std::vector<Vec3> axes_normals() {
-  std::vector<Vec3> normals;
-  for (int axis = 0; axis < 3; ++axis)
-    for (const double side : {1.0, -1.0}) normals.push_back(side * Vec3::Unit(axis));
-  return normals;
-}
 
 // Half spaces about the unit sphere; the corners of what they leave when moved inwards by `rounding`.
 Solid rounded_solid(Random& random, int faces, double rounding) {
@@ -108,7 +81,7 @@ Body make_body(Random& random, int kind) {
     case 0: {
       const Vec3 axes = log_axes(random, random.below(3) ? 0.1 : 1e-3);
       return closed(turned_solid(random, "ellipsoid", exact_ellipsoid(axes),
-                                 [=](const Vec3& d) { return ellipsoid_support(d, axes); }));
+                                 [=](const Vec3& d) { return test::ellipsoid_support(d, axes); }));
     }
     case 1:
       if (random.below(2))
@@ -130,37 +103,41 @@ Body make_body(Random& random, int kind) {
     case 6: {
       const Vec3 half = log_axes(random, 0.05);
       return closed(turned_solid(
-          random, "box", box(half), [=](const Vec3& d) { return box_support(d, half, 0); }, axes_normals()));
+          random, "box", box(half), [=](const Vec3& d) { return test::box_support(d, half, 0); },
+          test::axes_normals()));
     }
     case 7: {
       const Vec3 half = log_axes(random, 0.1);
       const double r = half.minCoeff() * random.uniform(0.05, 0.95);
       return closed(turned_solid(
           random, "rounded box", rounded_box(half, r),
-          [=](const Vec3& d) { return box_support(d, half - Vec3::Constant(r), r); }, axes_normals()));
+          [=](const Vec3& d) { return test::box_support(d, half - Vec3::Constant(r), r); },
+          test::axes_normals()));
     }
     case 8:
       return closed(rounded_solid(random, random.whole(8, 12), random.uniform(0.05, 0.4)));
     case 9: {
       const double height = random.log_uniform(0.05, 2),
                    rim = 0.5 * height * random.uniform(0.1, 0.9) / std::max(1.0, height);
-      return closed(
-          turned_solid(random, "tablet", tablet(1, height, rim),
-                       [=](const Vec3& d) { return disc_support(d, 1 - rim, 0.5 * height - rim, rim); },
-                       {Vec3::UnitZ(), -Vec3::UnitZ()}));
+      return closed(turned_solid(
+          random, "tablet", tablet(1, height, rim),
+          [=](const Vec3& d) { return test::disc_support(d, 1 - rim, 0.5 * height - rim, rim); },
+          test::poles()));
     }
     case 10: {
       const double blunt = random.uniform(0.2, 1), pointed = random.uniform(0.5, 2);
       return closed(turned_solid(
           random, "egg", egg(0.7, blunt, pointed),
-          [=](const Vec3& d) { return ellipsoid_support(d, Vec3(0.7, 0.7, d[2] > 0 ? pointed : blunt)); },
-          {Vec3::UnitZ(), -Vec3::UnitZ()}));
+          [=](const Vec3& d) {
+            return test::ellipsoid_support(d, Vec3(0.7, 0.7, d[2] > 0 ? pointed : blunt));
+          },
+          test::poles()));
     }
     case 11: {
       const double polar = random.log_uniform(0.05, 5);
-      return closed(turned_solid(random, "polar", revolved_ellipsoid(1, polar),
-                                 [=](const Vec3& d) { return ellipsoid_support(d, Vec3(1, 1, polar)); },
-                                 {Vec3::UnitZ(), -Vec3::UnitZ()}));
+      return closed(turned_solid(
+          random, "polar", revolved_ellipsoid(1, polar),
+          [=](const Vec3& d) { return test::ellipsoid_support(d, Vec3(1, 1, polar)); }, test::poles()));
     }
     case 12:
       return searched("pebble", random_pebble(static_cast<std::uint64_t>(random.below(1000)),
@@ -184,9 +161,6 @@ constexpr int kKinds = 16;
 
 double radius_of(const Particle& p) {
   return p.scale * p.shape->bounding_radius;
-}
-Vec3 support_of(const Body& body, const Particle& p, const Vec3& d) {
-  return p.scale * (p.q * body.solid.support(p.q.conjugate() * d));
 }
 
 // Of revolution, or one that looks like it; shape frame.
@@ -218,7 +192,7 @@ double small(Random& random, double most) {
 
 // Supports along n face each other `gap` apart.
 void face(const Body& a, const Body& b, const Vec3& n, double gap, PairCase* c) {
-  c->b.x = support_of(a, c->a, n) - support_of(b, c->b, -n) + gap * n;
+  c->b.x = support_of(a.solid, c->a, n) - support_of(b.solid, c->b, -n) + gap * n;
 }
 
 void place(const Body& a, const Body& b, Pose pose, Random& random, PairCase* c) {
@@ -249,7 +223,7 @@ void place(const Body& a, const Body& b, Pose pose, Random& random, PairCase* c)
     case Pose::coaxial: {
       const Vec3 axis = align();
       if (random.below(2)) {
-        const double room = axis.dot(support_of(a, c->a, axis) - support_of(b, c->b, -axis));
+        const double room = axis.dot(support_of(a.solid, c->a, axis) - support_of(b.solid, c->b, -axis));
         c->b.x = (room - size * random.log_uniform(1e-6, 2)) * axis;
       } else {
         c->b.x = random.uniform(-1, 1) * size * axis;
@@ -275,20 +249,6 @@ void place(const Body& a, const Body& b, Pose pose, Random& random, PairCase* c)
   }
 }
 
-const std::vector<Vec3>& spiral() {
-  static const std::vector<Vec3> directions = [] {
-    constexpr int kCount = 2000;
-    std::vector<Vec3> d;
-    for (int i = 0; i < kCount; ++i) {
-      const double z = 1 - (2 * i + 1) / double(kCount), r = std::sqrt(1 - z * z),
-                   angle = 2.399963229728653 * i;
-      d.emplace_back(r * std::cos(angle), r * std::sin(angle), z);
-    }
-    return d;
-  }();
-  return directions;
-}
-
 }  // namespace
 
 Fuzz::Fuzz(std::uint64_t seed, int count) : seed_(seed) {
@@ -310,7 +270,7 @@ PairCase Fuzz::pair(Pose pose, long k) const {
   place(a, b, pose, random, &c);
   c.truth.gap = -std::numeric_limits<double>::infinity();
   c.overlap = [&a, &b, ca = c.a, cb = c.b](const Vec3& d) {
-    return d.dot(support_of(a, ca, d)) - d.dot(support_of(b, cb, -d)) - d.dot(cb.x - ca.x);
+    return d.dot(support_of(a.solid, ca, d)) - d.dot(support_of(b.solid, cb, -d)) - d.dot(cb.x - ca.x);
   };
   return c;
 }
@@ -319,55 +279,27 @@ Truth Fuzz::truth(const PairCase& c, std::uint64_t seed) const {
   Random random(seed);
   const Body &a = body_of(c.a), &b = body_of(c.b);
   const bool cheap = a.cheap && b.cheap;
-  struct Start {
-    double p;
-    Vec3 d;
-  };
-  std::vector<Start> starts;
-  const auto offer = [&](const Vec3& d) { starts.push_back({c.overlap(d), d}); };
-  for (const Vec3& d : spiral())
-    if (cheap || random.below(4) == 0) offer(d);
-  for (const Vec3& n : a.solid.normals) offer(c.a.q * n);
-  for (const Vec3& n : b.solid.normals) offer(c.b.q * -n);
+  std::vector<Vec3> starts;
+  for (const Vec3& d : test::spiral(2000))
+    if (cheap || random.below(4) == 0) starts.push_back(d);
+  for (const Vec3& n : a.solid.normals) starts.push_back(c.a.q * n);
+  for (const Vec3& n : b.solid.normals) starts.push_back(c.b.q * -n);
   for (int k = 0; k < 3; ++k)
     for (const double side : {1.0, -1.0}) {
-      offer(c.a.q * (c.a.shape->principal_axes * (side * Vec3::Unit(k))));
-      offer(c.b.q * (c.b.shape->principal_axes * (side * Vec3::Unit(k))));
+      starts.push_back(c.a.q * (c.a.shape->principal_axes * (side * Vec3::Unit(k))));
+      starts.push_back(c.b.q * (c.b.shape->principal_axes * (side * Vec3::Unit(k))));
     }
-  std::sort(starts.begin(), starts.end(), [](const Start& x, const Start& y) { return x.p < y.p; });
-  std::vector<Start> minima;
-  for (const Start& s : starts) {
-    if (minima.size() == (cheap ? 8 : 3)) break;
-    const auto same = [&](const Start& m) { return m.d.dot(s.d) > 0.99; };
-    if (std::none_of(minima.begin(), minima.end(), same)) minima.push_back(s);
-  }
+  test::Compass compass;
+  if (!cheap) compass.minima = 3, compass.moves = 100;
   Truth truth;
   truth.known = Known::bound;
-  double least = 1e300;
-  for (Start m : minima) {
-    int moves = 0;
-    for (double stride = 0.05; stride > 1e-12 && moves < (cheap ? 600 : 100); ++moves) {
-      const Vec3 t = m.d.cross(random.direction()).normalized(), s = m.d.cross(t);
-      Start next = m;
-      for (const Vec3& step : {t, Vec3(-t), s, Vec3(-s)}) {
-        const Vec3 d = (m.d + stride * step).normalized();
-        const double p = c.overlap(d);
-        if (p < next.p) next = {p, d};
-      }
-      stride *= next.p < m.p ? 1.5 : 0.7;
-      m = next;
-    }
-    least = std::min(least, m.p);
-  }
-  truth.gap = -least;
+  truth.gap = -test::least_overlap(c.overlap, starts, compass, random);
   return truth;
 }
 
 Judgement judge(const Fuzz& fuzz, const PairCase& c, const Truth& truth, const ContactResult& r) {
   double noise = 0;
-  for (const Particle* p : {&c.a, &c.b})
-    for (const Body& body : fuzz.bodies())
-      if (body.solid.shape.get() == p->shape) noise += body.accuracy * radius_of(*p);
+  for (const Particle* p : {&c.a, &c.b}) noise += fuzz.body_of(*p).accuracy * radius_of(*p);
   const double reach = std::max(radius_of(c.a), radius_of(c.b)),
                size = std::min(radius_of(c.a), radius_of(c.b));
   Judgement j;

@@ -42,11 +42,9 @@ class Fuzz {
   // truth, but no solver may be above it.
   families::Truth truth(const families::PairCase& pair, std::uint64_t seed) const;
 
-  const std::vector<Body>& bodies() const { return bodies_; }
-
- private:
   const Body& body_of(const Particle& p) const;
 
+ private:
   std::uint64_t seed_;
   std::vector<Body> bodies_;
 };

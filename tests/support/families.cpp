@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
+#include <limits>
 #include <map>
 #include <memory>
 
@@ -14,6 +15,7 @@
 #include "shapes/revolved.h"
 #include "support/as_surface.h"
 #include "support/ellipsoid_oracle.h"
+#include "support/least_overlap.h"
 #include "support/pairs.h"
 #include "support/solid_families.h"
 
@@ -126,8 +128,7 @@ Spot random_spot(const Body& body, Random& random) {
 }
 // Support point of an ellipsoid about its centre, in closed form.
 Spot ellipsoid_spot(const Body& body, const Vec3& d) {
-  const Vec3 scaled_d = body.semi_axes.cwiseProduct(d);
-  return {body.semi_axes.cwiseProduct(scaled_d) / scaled_d.norm(), d};
+  return {test::ellipsoid_support(d, body.semi_axes), d};
 }
 // On a face of a box, `inset` inside its edges.
 Spot face_spot(const Body& body, Random& random, int axis, double inset) {
@@ -188,49 +189,20 @@ double signed_gap(Random& random, double size, double least, double most) {
 // --- truths
 // ----------------------------------------------------------------------------------------------------
 
-const std::vector<Vec3>& spiral(int count) {
-  static std::map<int, std::vector<Vec3>> made;
-  std::vector<Vec3>& directions = made[count];
-  for (int i = static_cast<int>(directions.size()); i < count; ++i) {
-    const double z = 1 - (2 * i + 1) / double(count), r = std::sqrt(1 - z * z), angle = 2.399963229728653 * i;
-    directions.emplace_back(r * std::cos(angle), r * std::sin(angle), z);
-  }
-  return directions;
-}
-
 // Least overlap over 500 directions, the best few of them refined by a compass that turns at random.
 Truth search_truth(const PairCase& c, Random& random) {
-  struct Start {
-    double p;
-    Vec3 d;
-  };
-  std::vector<Start> starts;
-  for (const Vec3& d : spiral(500)) starts.push_back({test::overlap_along(c.a, c.b, d), d});
-  std::sort(starts.begin(), starts.end(), [](const Start& x, const Start& y) { return x.p < y.p; });
-  std::vector<Start> minima;
-  for (const Start& s : starts) {
-    if (minima.size() == 5) break;
-    const auto same = [&](const Start& m) { return m.d.dot(s.d) > 0.95; };
-    if (std::none_of(minima.begin(), minima.end(), same)) minima.push_back(s);
-  }
-  Start best{1e300, Vec3::UnitZ()};
-  for (Start m : minima) {
-    for (double stride = 0.1; stride > 1e-7;) {
-      const Vec3 t = m.d.cross(random.direction()).normalized(), s = m.d.cross(t);
-      Start next = m;
-      for (const Vec3& step : {t, Vec3(-t), s, Vec3(-s)}) {
-        const Vec3 d = (m.d + stride * step).normalized();
-        const double p = test::overlap_along(c.a, c.b, d);
-        if (p < next.p) next = {p, d};
-      }
-      stride *= next.p < m.p ? 1.2 : 0.5;
-      m = next;
-    }
-    if (m.p < best.p) best = m;
-  }
+  test::Compass compass;
+  compass.minima = 5;
+  compass.one_basin = 0.95;
+  compass.stride = 0.1;
+  compass.finest = 1e-7;
+  compass.longer = 1.2;
+  compass.shorter = 0.5;
+  compass.moves = std::numeric_limits<int>::max();
   Truth truth;
   truth.known = Known::bound;
-  truth.gap = -best.p;
+  const auto overlap = [&](const Vec3& d) { return test::overlap_along(c.a, c.b, d); };
+  truth.gap = -test::least_overlap(overlap, test::spiral(500), compass, random);
   return truth;
 }
 

@@ -39,23 +39,6 @@ Actor closed_form(const std::string& name, std::vector<NurbsSurface> surfaces, S
   return actor;
 }
 
-double sign_of(double x) {
-  return x < 0 ? -1 : 1;
-}
-
-// Of a disc of radius r and half thickness h, rounded by a ball.
-Vec3 disc_support(const Vec3& d, double r, double h, double ball) {
-  const double across = std::hypot(d[0], d[1]);
-  Vec3 x(0, 0, sign_of(d[2]) * h);
-  if (across > 0) x.head<2>() = r / across * d.head<2>();
-  return x + ball * d.normalized();
-}
-
-Vec3 ellipsoid_support(const Vec3& d, const Vec3& axes) {
-  const Vec3 y = axes.cwiseProduct(d);
-  return axes.cwiseProduct(y) / y.norm();
-}
-
 // The highest of a grid on every patch, the best few patches then sampled closer and closer about theirs.
 class SampledSupport {
  public:
@@ -138,29 +121,27 @@ std::vector<Actor> make_actors() {
       actor.solid = families::solids_of(static_cast<Kind>(kind))[k];
       actors.push_back(actor);
     }
-  const std::vector<Vec3> poles = {Vec3::UnitZ(), -Vec3::UnitZ()};
-  std::vector<Vec3> faces;
-  for (int axis = 0; axis < 3; ++axis)
-    for (const double side : {1.0, -1.0}) faces.push_back(side * Vec3::Unit(axis));
+  const std::vector<Vec3> ends = test::poles(), faces = test::axes_normals();
   actors.push_back(closed_form(
-      "tablet", tablet(1, 0.6, 0.1), [](const Vec3& d) { return disc_support(d, 0.9, 0.2, 0.1); }, poles));
+      "tablet", tablet(1, 0.6, 0.1), [](const Vec3& d) { return test::disc_support(d, 0.9, 0.2, 0.1); },
+      ends));
   actors.push_back(closed_form(
-      "coin", tablet(1, 0.1, 0.02), [](const Vec3& d) { return disc_support(d, 0.98, 0.03, 0.02); }, poles));
+      "coin", tablet(1, 0.1, 0.02), [](const Vec3& d) { return test::disc_support(d, 0.98, 0.03, 0.02); },
+      ends));
   actors.push_back(closed_form(
       "rounded box", rounded_box({1, 0.7, 0.5}, 0.1),
-      [](const Vec3& d) -> Vec3 {
-        Vec3 x = 0.1 * d.normalized();
-        const Vec3 core(0.9, 0.6, 0.4);
-        for (int k = 0; k < 3; ++k) x[k] += sign_of(d[k]) * core[k];
-        return x;
+      [](const Vec3& d) {
+        return test::box_support(d, {0.9, 0.6, 0.4}, 0.1);
       },
       faces));
   actors.push_back(closed_form(
       "box", box({1, 0.8, 0.6}),
-      [](const Vec3& d) -> Vec3 { return Vec3(sign_of(d[0]), 0.8 * sign_of(d[1]), 0.6 * sign_of(d[2])); },
+      [](const Vec3& d) {
+        return test::box_support(d, {1, 0.8, 0.6}, 0);
+      },
       faces));
   actors.push_back(closed_form("disc", exact_ellipsoid({1, 1, 0.05}), [](const Vec3& d) {
-    return ellipsoid_support(d, {1, 1, 0.05});
+    return test::ellipsoid_support(d, {1, 1, 0.05});
   }));
   actors.push_back(
       closed_form("ball", exact_ellipsoid({1, 1, 1}), [](const Vec3& d) { return d.normalized(); }));

@@ -6,6 +6,8 @@
 #include <cmath>
 #include <map>
 
+#include "support/least_overlap.h"
+
 namespace nurbs::families {
 
 using test::Solid;
@@ -50,10 +52,6 @@ const Solid& partner(Kind kind, Random& random) {
   return any_of(which == 1 ? static_cast<Kind>(random.below(kKinds)) : kind, random);
 }
 
-Vec3 support_of(const Solid& solid, const Particle& p, const Vec3& d) {
-  return p.scale * (p.q * solid.support(p.q.conjugate() * d));
-}
-
 // Directions that matter: any, of a face, along the support of a vertex, and next to those.
 Vec3 some_direction(const Solid& solid, Random& random) {
   Vec3 d = random.direction();
@@ -67,44 +65,12 @@ Vec3 some_direction(const Solid& solid, Random& random) {
 
 // Least overlap: a scan, directions of faces, and a compass that turns at random from the best.
 Truth search_least(const PairCase& c, const Solid& a, const Solid& b, Random& random) {
-  struct Start {
-    double p;
-    Vec3 d;
-  };
-  std::vector<Start> starts;
-  const auto offer = [&](const Vec3& d) { starts.push_back({c.overlap(d), d}); };
-  for (int i = 0; i < 2000; ++i) {
-    const double z = 1 - (2 * i + 1) / 2000.0, r = std::sqrt(1 - z * z), angle = 2.399963229728653 * i;
-    offer(Vec3(r * std::cos(angle), r * std::sin(angle), z));
-  }
-  for (const Vec3& n : a.normals) offer(c.a.q * n);
-  for (const Vec3& n : b.normals) offer(c.b.q * -n);
-  std::sort(starts.begin(), starts.end(), [](const Start& x, const Start& y) { return x.p < y.p; });
-  std::vector<Start> minima;
-  for (const Start& s : starts) {
-    if (minima.size() == 8) break;
-    const auto same = [&](const Start& m) { return m.d.dot(s.d) > 0.99; };
-    if (std::none_of(minima.begin(), minima.end(), same)) minima.push_back(s);
-  }
+  std::vector<Vec3> starts = test::spiral(2000);
+  for (const Vec3& n : a.normals) starts.push_back(c.a.q * n);
+  for (const Vec3& n : b.normals) starts.push_back(c.b.q * -n);
   Truth truth;
   truth.known = Known::bound;
-  double least = 1e300;
-  for (Start m : minima) {
-    int moves = 0;
-    for (double stride = 0.05; stride > 1e-12 && moves < 600; ++moves) {
-      const Vec3 t = m.d.cross(random.direction()).normalized(), s = m.d.cross(t);
-      Start next = m;
-      for (const Vec3& step : {t, Vec3(-t), s, Vec3(-s)}) {
-        const Vec3 d = (m.d + stride * step).normalized();
-        const double p = c.overlap(d);
-        if (p < next.p) next = {p, d};
-      }
-      stride *= next.p < m.p ? 1.5 : 0.7;
-      m = next;
-    }
-    least = std::min(least, m.p);
-  }
-  truth.gap = -least;
+  truth.gap = -test::least_overlap(c.overlap, starts, {}, random);
   return truth;
 }
 

@@ -49,10 +49,47 @@ std::function<Vec3(const Vec3&)> support_of_circles(std::vector<Vec2> circles) {
 Solid revolved_polyline(Random& random, const std::string& name, const std::vector<Vec2>& points,
                         double weights) {
   return turned_solid(random, name, {revolve(polyline(random, points, weights), 1)},
-                      support_of_circles(points), {Vec3::UnitZ(), -Vec3::UnitZ()});
+                      support_of_circles(points), poles());
+}
+
+double sign_of(double x) {
+  return x < 0 ? -1 : 1;
 }
 
 }  // namespace
+
+Vec3 support_of(const Solid& solid, const Particle& p, const Vec3& d) {
+  return p.scale * (p.q * solid.support(p.q.conjugate() * d));
+}
+
+Vec3 ellipsoid_support(const Vec3& d, const Vec3& semi_axes) {
+  const Vec3 y = semi_axes.cwiseProduct(d);
+  return semi_axes.cwiseProduct(y) / y.norm();
+}
+
+Vec3 box_support(const Vec3& d, const Vec3& half, double ball) {
+  Vec3 x = ball * d.normalized();
+  for (int k = 0; k < 3; ++k) x[k] += sign_of(d[k]) * half[k];
+  return x;
+}
+
+Vec3 disc_support(const Vec3& d, double r, double h, double ball) {
+  const double across = std::hypot(d[0], d[1]);
+  Vec3 x(0, 0, sign_of(d[2]) * h);
+  if (across > 0) x.head<2>() = r / across * d.head<2>();
+  return x + ball * d.normalized();
+}
+
+std::vector<Vec3> axes_normals() {
+  std::vector<Vec3> normals;
+  for (int axis = 0; axis < 3; ++axis)
+    for (const double side : {1.0, -1.0}) normals.push_back(side * Vec3::Unit(axis));
+  return normals;
+}
+
+std::vector<Vec3> poles() {
+  return {Vec3::UnitZ(), -Vec3::UnitZ()};
+}
 
 Solid turned_solid(Random& random, const std::string& name, std::vector<NurbsSurface> surfaces,
                    std::function<Vec3(const Vec3&)> support, std::vector<Vec3> normals) {
@@ -105,7 +142,7 @@ Solid lens(Random& random, double bend) {
     if (bend * across < 1) return bend * n - (n[2] > 0 ? low : -low) * Vec3::UnitZ();
     return Vec3(n[0] / across, n[1] / across, 0);
   };
-  return turned_solid(random, "lens", {revolve(profile, 2)}, support, {Vec3::UnitZ(), -Vec3::UnitZ()});
+  return turned_solid(random, "lens", {revolve(profile, 2)}, support, poles());
 }
 
 Solid polyhedron(Random& random, int points, double squeeze, double weights) {
@@ -145,10 +182,7 @@ Solid polyhedron(Random& random, int points, double squeeze, double weights) {
 Solid ellipsoid_solid(const Vec3& axes) {
   Solid solid;
   solid.shape = make_shape("ellipsoid", exact_ellipsoid(axes));
-  solid.support = [axes](const Vec3& d) -> Vec3 {
-    const Vec3 scaled = axes.cwiseProduct(d);
-    return axes.cwiseProduct(scaled) / scaled.norm();
-  };
+  solid.support = [axes](const Vec3& d) { return ellipsoid_support(d, axes); };
   return solid;
 }
 

@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "body/shape.h"
+#include "contact/contact.h"
 #include "support/random.h"
 
 namespace nurbs::test {
@@ -19,6 +19,18 @@ struct Solid {
                                              // its centre of mass
   std::vector<Vec3> normals;  // of flat faces and other directions worth asking, frame of the shape
 };
+
+// The same on a placed body, from its centre, lab.
+Vec3 support_of(const Solid& solid, const Particle& p, const Vec3& d);
+
+// Furthest points along d, any length, of bodies about the origin, axes along the coordinates': an ellipsoid;
+// a box of half edges `half`, and a disc about z of radius r and half thickness h, rounded by a ball.
+Vec3 ellipsoid_support(const Vec3& d, const Vec3& semi_axes);
+Vec3 box_support(const Vec3& d, const Vec3& half, double ball);
+Vec3 disc_support(const Vec3& d, double r, double h, double ball);
+// The six directions of the axes, and the two of z.
+std::vector<Vec3> axes_normals();
+std::vector<Vec3> poles();
 
 // A body of surfaces whose support about the origin of their frame is `support`, turned by a random rotation.
 Solid turned_solid(Random& random, const std::string& name, std::vector<NurbsSurface> surfaces,

@@ -1,0 +1,28 @@
+// The least overlap of two bodies by a search over directions, knowing nothing but p(d).
+#pragma once
+
+#include <functional>
+#include <vector>
+
+#include "support/random.h"
+
+namespace nurbs::test {
+
+// Unit directions spread evenly over the sphere.
+const std::vector<Vec3>& spiral(int count);
+
+// A compass that turns at random: it moves to the best of four directions a stride (rad) away.
+struct Compass {
+  int minima = 8;           // of the best starts, those in one basin counted once, that are followed
+  double one_basin = 0.99;  // cosine
+  double stride = 0.05;     // the first ...
+  double finest = 1e-12;    // ... and the last
+  double longer = 1.5, shorter = 0.7;  // its factors after a move and without one
+  int moves = 600;                     // at most
+};
+
+// The least p found from `starts`, unit: what can be found is no proof, but the minimum is not above it.
+double least_overlap(const std::function<double(const Vec3&)>& p, const std::vector<Vec3>& starts,
+                     const Compass& compass, Random& random);
+
+}  // namespace nurbs::test
