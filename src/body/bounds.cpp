@@ -13,11 +13,8 @@
 namespace nurbs {
 namespace {
 
-// The field num / den over a rectangle, both in Bernstein form of degree (m, n), coefficient (i, j) at i (n +
-// 1) + j.
-struct Field {
-  int m = 0, n = 0;
-  std::vector<double> num, den;
+// The field num / den over a rectangle.
+struct Field : SquaredDistance {
   double upper = 0;  // largest ratio of coefficients: bounds the field since den > 0
 };
 
@@ -38,37 +35,9 @@ double corner_value(const Field& f) {
   return best;
 }
 
-// sign * |w x|^2 and w^2 as Bernstein products (NURBS Book, section 6.3: C(p,i) C(p,k) / C(2p,i+k)).
-Field squared_distance(const BezierPatch& patch, double sign) {
-  const int p = patch.degree_u, q = patch.degree_v;
-  Field f;
-  f.m = 2 * p;
-  f.n = 2 * q;
-  f.num.assign(static_cast<size_t>(f.m + 1) * (f.n + 1), 0);
-  f.den = f.num;
-  std::array<double, kMaxDegree + 1> cp, cq;
-  for (int i = 0; i <= p; ++i) cp[i] = binomial(p, i);
-  for (int j = 0; j <= q; ++j) cq[j] = binomial(q, j);
-  for (int i = 0; i <= p; ++i) {
-    for (int j = 0; j <= q; ++j) {
-      for (int k = 0; k <= p; ++k) {
-        for (int l = 0; l <= q; ++l) {
-          const Vec4 &a = patch.point(i, j), &b = patch.point(k, l);
-          const double c = cp[i] * cp[k] * cq[j] * cq[l];
-          const size_t at = static_cast<size_t>(i + k) * (f.n + 1) + (j + l);
-          f.num[at] += sign * c * a.head<3>().dot(b.head<3>());
-          f.den[at] += c * a[3] * b[3];
-        }
-      }
-    }
-  }
-  for (int i = 0; i <= f.m; ++i) {
-    for (int j = 0; j <= f.n; ++j) {
-      const double c = binomial(f.m, i) * binomial(f.n, j);
-      f.num[static_cast<size_t>(i) * (f.n + 1) + j] /= c;
-      f.den[static_cast<size_t>(i) * (f.n + 1) + j] /= c;
-    }
-  }
+Field signed_distance(const BezierPatch& patch, double sign) {
+  Field f{squared_distance(patch)};
+  for (double& c : f.num) c *= sign;
   update_upper(f);
   return f;
 }
@@ -106,7 +75,7 @@ double bound_squared(const std::vector<BezierPatch>& patches, double sign) {
   std::priority_queue<Field, std::vector<Field>, decltype(lower)> open(lower);
   double reached = -std::numeric_limits<double>::infinity(), magnitude = 0;
   for (const BezierPatch& patch : patches) {
-    Field f = squared_distance(patch, sign);
+    Field f = signed_distance(patch, sign);
     reached = std::max(reached, corner_value(f));
     magnitude = std::max(magnitude, std::abs(f.upper));
     open.push(std::move(f));
@@ -125,6 +94,41 @@ double bound_squared(const std::vector<BezierPatch>& patches, double sign) {
 }
 
 }  // namespace
+
+// As Bernstein products (NURBS Book, section 6.3: C(p,i) C(p,k) / C(2p,i+k)).
+SquaredDistance squared_distance(const BezierPatch& patch, double less) {
+  const int p = patch.degree_u, q = patch.degree_v;
+  SquaredDistance f;
+  f.m = 2 * p;
+  f.n = 2 * q;
+  f.num.assign(static_cast<size_t>(f.m + 1) * (f.n + 1), 0);
+  f.den = f.num;
+  std::array<double, kMaxDegree + 1> cp, cq;
+  for (int i = 0; i <= p; ++i) cp[i] = binomial(p, i);
+  for (int j = 0; j <= q; ++j) cq[j] = binomial(q, j);
+  for (int i = 0; i <= p; ++i) {
+    for (int j = 0; j <= q; ++j) {
+      for (int k = 0; k <= p; ++k) {
+        for (int l = 0; l <= q; ++l) {
+          const Vec4 &a = patch.point(i, j), &b = patch.point(k, l);
+          const double c = cp[i] * cp[k] * cq[j] * cq[l];
+          const size_t at = static_cast<size_t>(i + k) * (f.n + 1) + (j + l);
+          const double weight = a[3] * b[3];
+          f.num[at] += c * (a.head<3>().dot(b.head<3>()) - less * weight);
+          f.den[at] += c * weight;
+        }
+      }
+    }
+  }
+  for (int i = 0; i <= f.m; ++i) {
+    for (int j = 0; j <= f.n; ++j) {
+      const double c = binomial(f.m, i) * binomial(f.n, j);
+      f.num[static_cast<size_t>(i) * (f.n + 1) + j] /= c;
+      f.den[static_cast<size_t>(i) * (f.n + 1) + j] /= c;
+    }
+  }
+  return f;
+}
 
 RadiusBounds bound_radius(const std::vector<BezierPatch>& patches) {
   RadiusBounds bounds;

@@ -7,6 +7,14 @@
 
 namespace nurbs {
 
+// (|x|^2 - less) w^2 and w^2 of a patch, Bernstein coefficients of twice its degrees, (i, j) at i (n + 1) +
+// j.
+struct SquaredDistance {
+  int m = 0, n = 0;
+  std::vector<double> num, den;
+};
+SquaredDistance squared_distance(const BezierPatch& patch, double less = 0);
+
 struct RadiusBounds {
   double inner = 0;  // no surface point is nearer to the origin
   double outer = 0;  // none is farther

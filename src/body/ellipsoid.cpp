@@ -6,7 +6,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "nurbs/bernstein.h"
+#include "body/bounds.h"
 #include "nurbs/tolerances.h"
 
 namespace nurbs {
@@ -68,29 +68,12 @@ void improve(const std::vector<BezierPatch>& patches, Ellipsoid* e) {
 }
 
 // Bound of ||y|^2 - 1| over the patch, y as above.
-double off_ball(const BezierPatch& patch, const Ellipsoid& e) {
-  const int m = patch.degree_u, n = patch.degree_v;
-  std::vector<Vec4> points;
-  for (const Vec4& p : patch.points) {
-    const Vec3 y = to_ball(e, p.head<3>());
-    points.emplace_back(y[0], y[1], y[2], p[3]);
-  }
-  std::vector<double> cu(m + 1), cv(n + 1);
-  for (int i = 0; i <= m; ++i) cu[i] = binomial(m, i);
-  for (int j = 0; j <= n; ++j) cv[j] = binomial(n, j);
+double off_ball(BezierPatch patch, const Ellipsoid& e) {
+  for (Vec4& p : patch.points) p.head<3>() = to_ball(e, p.head<3>());
+  const SquaredDistance square = squared_distance(patch, 1);
   double most = 0;
-  for (int u = 0; u <= 2 * m; ++u)
-    for (int v = 0; v <= 2 * n; ++v) {
-      double left = 0, weight = 0;
-      for (int i = std::max(0, u - m); i <= std::min(m, u); ++i)
-        for (int j = std::max(0, v - n); j <= std::min(n, v); ++j) {
-          const Vec4 &p = points[i * (n + 1) + j], &q = points[(u - i) * (n + 1) + v - j];
-          const double share = cu[i] * cu[u - i] * cv[j] * cv[v - j], w = p[3] * q[3];
-          left += share * (p.head<3>().dot(q.head<3>()) - w);
-          weight += share * w;
-        }
-      most = std::max(most, std::abs(left) / weight);
-    }
+  for (size_t k = 0; k < square.num.size(); ++k)
+    most = std::max(most, std::abs(square.num[k]) / square.den[k]);
   return most;
 }
 
