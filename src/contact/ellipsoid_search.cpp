@@ -16,21 +16,21 @@ double norm(const V& v) {
   return root(dot(v, v));
 }
 
-void scaled_root(const Ellipsoid& e, double scale, double (&root)[6]) {
+// A body's share of what the pair remembers; returns it placed.
+Placed put(const Particle& p, double (&root)[6], double& least2) {
+  const Ellipsoid& e = p.shape->ellipsoid;
   const Mat3& r = e.root;
   const double values[6] = {r(0, 0), r(1, 1), r(2, 2), r(0, 1), r(0, 2), r(1, 2)};
-  for (int k = 0; k < 6; ++k) root[k] = scale * values[k];
+  for (int k = 0; k < 6; ++k) root[k] = p.scale * values[k];
+  const double least = p.scale * e.least();
+  least2 = least * least;
+  return place_ellipsoid(root, least2, turn(p.q.toRotationMatrix()));
 }
 
-double squared(double x) {
-  return x * x;
-}
-
-// A pair and how well it is to be solved.
+// A pair of bodies and how well it is to be solved.
 struct Problem {
   Placed a, b;
   V offset;
-  double free;
   double tolerance, size, noise;
   double reach;  // proven further apart is enough
 };
@@ -39,7 +39,6 @@ struct Solution {
   V d;
   EllipsoidContactOf<double> contact;
   int iterations = 0;
-  bool apart = false;  // the contact's gap is that along d, not the least
 };
 
 // A descent direction of Newton's length, where the Hessian may be indefinite: its eigenvalues are lifted.
@@ -58,7 +57,7 @@ bool descend(const Problem& q, V d, Solution* out) {
   V base = d, by{};
   double best = kFarAway;
   for (out->iterations = 1; out->iterations <= kEllipsoidColdSteps; ++out->iterations) {
-    const EllipsoidStepOf<double> s = newton_step(q.a, q.b, q.offset, q.free, d);
+    const EllipsoidStepOf<double> s = newton_step(q.a, q.b, q.offset, 1.0, d);
     if (!(s.p <= best + q.noise)) {
       by = 0.5 * by;
       d = turned(base, by);
@@ -67,11 +66,9 @@ bool descend(const Problem& q, V d, Solution* out) {
     best = std::min(best, s.p);
     base = d;
     if (-s.p - q.noise > q.reach) {
-      out->contact = look_along(q.a, q.b, q.offset, q.free, d);
-      out->apart = true;
+      out->contact = look_along(q.a, q.b, q.offset, 1.0, d);
       out->d = d;
       if (out->contact.beyond <= 0.5 * (out->contact.gap - q.noise - q.reach)) return true;
-      out->apart = false;
     }
     by = s.minimum ? s.x * s.t + s.y * s.s : downhill(s);
     const double turn = norm(by);
@@ -79,7 +76,7 @@ bool descend(const Problem& q, V d, Solution* out) {
     if (turn > kEllipsoidTurn) by = (kEllipsoidTurn / turn) * by;
     d = turned(base, by);
     if (!s.minimum || turn > kEllipsoidNear) continue;
-    out->contact = look_along(q.a, q.b, q.offset, q.free, d);
+    out->contact = look_along(q.a, q.b, q.offset, 1.0, d);
     out->d = d;
     const double tilt2 = out->contact.across2 * s.soft * s.soft;
     if (good_enough(out->contact, tilt2, q.tolerance, q.size, q.noise)) return true;
@@ -100,7 +97,14 @@ bool solve(const Problem& q, const PairMemory& memory, Solution* out) {
   return apart > kNoDirection * q.size && descend(q, (1 / apart) * q.offset, out);
 }
 
-void remember(const Solution& s, EllipsoidPair pair, PairMemory* memory) {
+// The proof, and of a pair that is not apart where to go on.
+void remember(const Solution& s, const ContactResult& r, EllipsoidPair pair, const Vec3& offset,
+              const Quat& q_a, const Quat& q_b, PairMemory* memory) {
+  const bool apart = r.status == Status::separated;
+  set_proof(r.normal, r.lower, offset, q_a, q_b, &memory->proof);
+  memory->proof.contact = !apart;
+  memory->on_a.patch = memory->on_b.patch = -1;
+  if (apart) return drop_model(&memory->model);
   EllipsoidPair last;
   std::memcpy(&last, &memory->model, sizeof last);
   pair.direction = s.d;
@@ -142,16 +146,11 @@ bool solve_ellipsoids(const Particle& a, const Particle& b, const ContactSetting
   EllipsoidPair pair{};
   pair.error = ea.error + eb.error;
   if (pair.error * (ra + rb) > kEllipsoidError * allowed) return give_up(&memory);
-  scaled_root(ea, a.scale, pair.root_a);
-  scaled_root(eb, b.scale, pair.root_b);
-  pair.least2_a = squared(a.scale * ea.least());
-  pair.least2_b = squared(b.scale * eb.least());
   Problem q;
-  q.a = place_ellipsoid(pair.root_a, pair.least2_a, turn(a.q.toRotationMatrix()));
-  q.b = place_ellipsoid(pair.root_b, pair.least2_b, turn(b.q.toRotationMatrix()));
+  q.a = put(a, pair.root_a, pair.least2_a);
+  q.b = put(b, pair.root_b, pair.least2_b);
   const Vec3 offset = b.x - a.x;
   q.offset = triple(offset);
-  q.free = 1;
   q.tolerance = settings.tolerance;
   q.size = size;
   q.noise = gap_roundoff(ra, rb, q.offset);
@@ -162,13 +161,7 @@ bool solve_ellipsoids(const Particle& a, const Particle& b, const ContactSetting
       !set_result(s, pair.error * (ra + rb) + q.noise, allowed, settings.reach, &found))
     return give_up(&memory);
   *r = found;
-  if (found.status == Status::separated)
-    drop_model(&memory.model);
-  else
-    remember(s, pair, &memory);
-  set_proof(found.normal, found.lower, offset, a.q, b.q, &memory.proof);
-  memory.proof.contact = found.status != Status::separated;
-  memory.on_a.patch = memory.on_b.patch = -1;
+  remember(s, found, pair, offset, a.q, b.q, &memory);
   return true;
 }
 
@@ -181,23 +174,15 @@ bool solve_ellipsoid_on_plane(const Particle& particle, double height, const Vec
   pair.error = e.error;
   const double noise = kRoundoff * (std::abs(height) + radius), slack = pair.error * radius + noise;
   if (!(2 * slack <= settings.tolerance * radius)) return give_up(&memory);
-  scaled_root(e, particle.scale, pair.root_b);
-  pair.least2_b = squared(particle.scale * e.least());
-  const Placed a{}, b = place_ellipsoid(pair.root_b, pair.least2_b, turn(particle.q.toRotationMatrix()));
+  const Placed plane{}, body = put(particle, pair.root_b, pair.least2_b);
   Solution s;
   s.d = triple(normal);
-  s.contact = look_along(a, b, height * s.d, 0.0, s.d);
+  s.contact = look_along(plane, body, height * s.d, 0.0, s.d);
   set_result(s, slack, kFarAway, settings.reach, r);
   const Vec3 apart = height * normal;  // points are relative to the particle
   r->point_a -= apart;
   r->point_b -= apart;
-  if (r->status == Status::separated)
-    drop_model(&memory.model);
-  else
-    remember(s, pair, &memory);
-  set_proof(normal, r->lower, apart, Quat::Identity(), particle.q, &memory.proof);
-  memory.proof.contact = r->status != Status::separated;
-  memory.on_a.patch = memory.on_b.patch = -1;
+  remember(s, *r, pair, apart, Quat::Identity(), particle.q, &memory);
   return true;
 }
 

@@ -33,6 +33,7 @@ struct EllipsoidPairOf {
 };
 using EllipsoidPair = EllipsoidPairOf<double>;
 constexpr int kEllipsoidPairSize = 21;  // doubles
+constexpr int kEllipsoidMotion = 6;     // of them, direction and change, which every step renews
 static_assert(sizeof(EllipsoidPair) == kEllipsoidPairSize * sizeof(double));
 static_assert(kEllipsoidPairSize < kLocalModelSize, "in the place of the model's halves");
 constexpr double kEllipsoidPair = -2;  // LocalModel::unique of a memory that holds one
@@ -221,7 +222,7 @@ struct FollowedOf {
 // Newton from where d would be, had it moved on as it last did; one step is usual. By Newton's method a
 // step's direction is then wrong by third soft step^2 / 2, to leading order, where the third derivative of h
 // is at most 3 |x . t| t' h'' t / h along a tangent t. Only where `asked`; a lane that is good enough stays,
-// whatever the others need. 20 ns side by side.
+// whatever the others need.
 template <class Real>
 NURBS_INLINE FollowedOf<Real> follow(const EllipsoidPairOf<Real>& pair, const Turn<Real>& turn_a,
                                      const Turn<Real>& turn_b, const Triple<Real>& offset, const Real& free,
@@ -250,7 +251,7 @@ NURBS_INLINE FollowedOf<Real> follow(const EllipsoidPairOf<Real>& pair, const Tu
   return out;
 }
 
-// Gap, normal and points of two such bodies, some 0.1 us warm; false, and nothing done but what is remembered
+// Gap, normal and points of two such bodies, 0.17 us warm; false, and nothing done but what is remembered
 // of such a pair dropped, where they are none as far as the tolerance can tell, overlap by more than the
 // balls above, or Newton fails. Else the pair is proven apart, or the result converged; an EllipsoidPair is
 // then left in `memory`, and no surface points.

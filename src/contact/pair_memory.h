@@ -37,6 +37,12 @@ inline void drop_model(LocalModel* model) {
   model->unique = -std::numeric_limits<double>::infinity();
 }
 
+// Whether something else stands in a model's place, which its `unique` then says: kDeepProof (deep_search.h),
+// kEllipsoidPair (ellipsoid_search.h).
+inline bool is_mark(double unique) {
+  return unique < 0 && std::isfinite(unique);
+}
+
 // What is remembered of other bodies, other sizes or by another solver is worth nothing: dropped whole.
 inline void adopt(std::uint64_t stamp, PairMemory* m) {
   if (m->proof.stamp == stamp) return;

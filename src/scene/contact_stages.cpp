@@ -4,7 +4,6 @@
 #include <cmath>
 #include <limits>
 
-#include "contact/deep_search.h"
 #include "contact/ellipsoid_search.h"
 #include "laws/linear_law.h"
 #include "reference/cso.h"
@@ -437,13 +436,9 @@ void ContactStages::serve(ContactBlock& block, int first, Results& results) cons
   answer(ellipsoids, {c.d, c.contact.point_a, c.contact.point_b, c.contact.gap,
                       c.contact.lower - pair.error * (a.radius + b.radius) - noise, c.found});
   if (step_.setup) return;
-  const Triple<Wide> change = c.d - pair.direction;
-  put(c.found, c.d.x, block.field[0]);
-  put(c.found, c.d.y, block.field[1]);
-  put(c.found, c.d.z, block.field[2]);
-  put(c.found, change.x, block.field[3]);
-  put(c.found, change.y, block.field[4]);
-  put(c.found, change.z, block.field[5]);
+  pair.change = c.d - pair.direction;
+  pair.direction = c.d;
+  for (int k = 0; k < kEllipsoidMotion; ++k) put(c.found, fields[k], block.field[k]);
 }
 
 // Stage (d) for one contact.
@@ -452,8 +447,7 @@ void ContactStages::solve_lane(ContactBlock& block, int lane, Results& results) 
   PairMemory memory;
   memory.proof = *block.proof[lane];
   block.get(lane, kLocalModelSize, 10, &memory.on_a);
-  const auto holds_more = [](double unique) { return unique == kDeepProof || unique == kEllipsoidPair; };
-  if (holds_more(block.field[kUnique][lane]))
+  if (is_mark(block.field[kUnique][lane]))
     block.get(lane, 0, kLocalModelSize, &memory.model);
   else
     drop_model(&memory.model);
@@ -465,7 +459,7 @@ void ContactStages::solve_lane(ContactBlock& block, int lane, Results& results) 
   const std::int32_t contact = block.proof[lane]->contact;
   *block.proof[lane] = memory.proof;
   block.proof[lane]->contact = contact;
-  if (memory.model.unique > 0 || holds_more(memory.model.unique))
+  if (memory.model.unique > 0 || is_mark(memory.model.unique))
     block.set(lane, 0, kLocalModelSize, &memory.model);
   else
     block.field[kUnique][lane] = memory.model.unique;
