@@ -393,26 +393,9 @@ struct Maker {
   const char *kind, *about;
   std::vector<Argument> options;
   Body (*make)(const Options&);
+  const char* example;  // options of one
   const char* notes = "";
 };
-
-// Options of an example of each kind, in the order of makers().
-constexpr const char* kMakeExamples[] = {
-    "--radius 0.005",
-    "--axes 0.012,0.008,0.006",
-    "--axes 0.012,0.008,0.006 --spans 2",
-    "--axes 0.012,0.008,0.006",
-    "--seed 7 --radius 0.005 --roundness 0.6 --elongation 0.8 --flatness 0.6",
-    "--radius 0.003 --length 0.01",
-    "--radius 0.004 --height 0.003 --rim 0.0005",
-    "--radius 0.005 --cap 0.008 --rim 0.0003",
-    "--radius 0.004 --blunt 0.004 --pointed 0.006",
-    "--axes 0.01,0.008,0.006 --rounding 0.001",
-    "--solid octahedron --radius 0.01 --rounding 0.001",
-    "--axes 1,1,2 --exponent 4 --tolerance 0.1%",
-    "--equatorial 0.01 --polar 0.005",
-    "--axes 0.01,0.008,0.006",
-    "--inertia 1.0,0.9,0.8,-0.04,0.02,0.09 --mass 2"};
 
 const std::vector<Maker>& makers() {
   static const Argument kRadius{"--radius", "R", "default 1"}, kAxes{"--axes", "A,B,C", "semi-axes"},
@@ -420,10 +403,22 @@ const std::vector<Maker>& makers() {
   static const Argument kOuter{"--radius", "R", "of the body, across its axis"},
       kRim{"--rim", "R", "radius of the rim's rounding"};
   static const std::vector<Maker> kMakers = {
-      {"sphere", "exact, six biquartic rational patches", {kRadius}, make_sphere},
-      {"ellipsoid", "exact, six biquartic rational patches", {kAxes}, make_ellipsoid},
-      {"fitted-ellipsoid", "six bicubic patches, joints nearly smooth", {kAxes, kSpans}, make_fitted},
-      {"smooth-ellipsoid", "six bicubic patches, joints smooth", {kAxes}, make_smooth},
+      {"sphere", "exact, six biquartic rational patches", {kRadius}, make_sphere, "--radius 0.005"},
+      {"ellipsoid",
+       "exact, six biquartic rational patches",
+       {kAxes},
+       make_ellipsoid,
+       "--axes 0.012,0.008,0.006"},
+      {"fitted-ellipsoid",
+       "six bicubic patches, joints nearly smooth",
+       {kAxes, kSpans},
+       make_fitted,
+       "--axes 0.012,0.008,0.006 --spans 2"},
+      {"smooth-ellipsoid",
+       "six bicubic patches, joints smooth",
+       {kAxes},
+       make_smooth,
+       "--axes 0.012,0.008,0.006"},
       {"pebble",
        "asymmetric, six bicubic patches, joints smooth; with --seed a random one",
        {kRadius,
@@ -431,11 +426,13 @@ const std::vector<Maker>& makers() {
         {"--roundness", "R", "0 to 1, default 0.5: 1 is an ellipsoid, less more angular"},
         {"--elongation", "E", "second over first axis, 0.2 to 1, default 0.8"},
         {"--flatness", "F", "third over second axis, 0.2 to 1, default 0.7"}},
-       make_pebble},
+       make_pebble,
+       "--seed 7 --radius 0.005 --roundness 0.6 --elongation 0.8 --flatness 0.6"},
       {"capsule",
        "exact: cylinder with half spheres, axis z",
        {kOuter, {"--length", "L", "of the cylinder"}},
-       make_capsule},
+       make_capsule,
+       "--radius 0.003 --length 0.01"},
       {"tablet",
        "exact: cylinder with rounded rims, axis z; with --cap biconvex",
        {kOuter,
@@ -443,26 +440,31 @@ const std::vector<Maker>& makers() {
          "of the whole tablet from face to face; with --cap of its cylindrical band alone, 0 for none"},
         kRim,
         {"--cap", "C", "makes both faces domes, of this radius of curvature, at least that of the tablet"}},
-       make_tablet},
+       make_tablet,
+       "--radius 0.004 --height 0.003 --rim 0.0005"},
       {"lens",
        "exact: two spherical caps with a rounded rim, axis z",
        {kOuter, {"--cap", "C", "radius of the caps"}, kRim},
-       make_lens},
+       make_lens,
+       "--radius 0.005 --cap 0.008 --rim 0.0003"},
       {"egg",
        "exact: halves of two ellipsoids of revolution, axis z",
        {kOuter, {"--blunt", "A", "height of the blunt half"}, {"--pointed", "B", "of the other"}},
-       make_egg},
+       make_egg,
+       "--radius 0.004 --blunt 0.004 --pointed 0.006"},
       {"rounded-box",
        "exact: flat faces, edges of cylinders, corners of spheres",
        {{"--axes", "A,B,C", "half edges"}, {"--rounding", "R", "radius of edges and corners"}},
-       make_rounded_box},
+       make_rounded_box,
+       "--axes 0.01,0.008,0.006 --rounding 0.001"},
       {"rounded-polyhedron",
        "exact: flat faces, edges of cylinders, corners of spheres",
        {{"--solid", "NAME", "tetrahedron, cube, octahedron, dodecahedron or icosahedron"},
         {"--radius", "R", "of the sharp solid's corners, default 1"},
         {"--mesh", "FILE", "instead of --solid: the convex hull of a mesh (STL, OBJ, PLY)"},
         {"--rounding", "R", "radius of edges and corners; faces stay where they are"}},
-       make_rounded_polyhedron},
+       make_rounded_polyhedron,
+       "--solid octahedron --radius 0.01 --rounding 0.001"},
       {"superellipsoid",
        "|x/A|^E + |y/B|^E + |z/C|^E = 1, fitted: strictly convex, joints smooth",
        {kAxes,
@@ -471,18 +473,21 @@ const std::vector<Maker>& makers() {
          "share of the largest semi-axis, as 0.2%, the default: flat faces bulge by up to this"},
         {"--spans", "N",
          "instead, 1 to 12: bicubic, of N x N spans a patch, faces flat and slightly dented, joints kinked"}},
-       make_superellipsoid},
+       make_superellipsoid,
+       "--axes 1,1,2 --exponent 4 --tolerance 0.1%"},
       {"revolved",
        "exact ellipsoid, one rational patch, axis z",
        {{"--equatorial", "A", "semi-axis"}, {"--polar", "C", "semi-axis"}},
-       make_revolved},
-      {"box", "six flat faces", {{"--axes", "A,B,C", "half edges"}}, make_box},
+       make_revolved,
+       "--equatorial 0.01 --polar 0.005"},
+      {"box", "six flat faces", {{"--axes", "A,B,C", "half edges"}}, make_box, "--axes 0.01,0.008,0.006"},
       {"inertia",
        "near-ellipsoid of six bicubic patches with this inertia tensor about its centre of mass, the origin",
        {{"--inertia", "XX,YY,ZZ,XY,XZ,YZ", "of the solid, about its centre of mass"},
         {"--mass", "M", "this, or --density, or both"},
         {"--density", "D", "of the uniform solid"}},
        make_inertia,
+       "--inertia 1.0,0.9,0.8,-0.04,0.02,0.09 --mass 2",
        kInertiaNotes},
   };
   return kMakers;
@@ -663,10 +668,9 @@ void print_cost(const Shape& shape) {
       "  a contact here   %.0f ns resting, %.0f ns turning (1 mrad a step), %.0f ns cold, with its like\n",
       cost.resting, cost.turning, cost.cold);
   if (cost.unresolved > 0) std::printf("  unresolved       %d of the cold contacts\n", cost.unresolved);
-  const bool sphere = shape.inner_radius >= (1 - kSphere) * shape.bounding_radius;
   std::printf(
       "kind               %s\n",
-      sphere                  ? "sphere: contacts take the closed form"
+      shape.proofs.sphere     ? "sphere: contacts take the closed form"
       : shape.ellipsoid.found ? "ellipsoid: contacts take the closed form"
       : !shape.smooth         ? "creased: contacts on creases take the polytope method"
       : shape.concavity > kUnmentionedDent * shape.bounding_radius ? "dented: bridged by the convex hull"
@@ -716,14 +720,13 @@ CLI::App* add_make(CLI::App& app, std::vector<Options>& options) {
   command->allow_extras();
   command->formatter(std::make_shared<Help>(
       "nurbs-shape make KIND [options] -o FILE\n       nurbs-shape make KIND [options] FILE"));
-  const char* const* example = kMakeExamples;
   for (const Maker& maker : makers()) {
     CLI::App* kind = command->add_subcommand(maker.kind, maker.about);
     kind->formatter(
         std::make_shared<Help>("nurbs-shape make " + std::string(maker.kind) + " [options] -o FILE"));
     const std::string notes = maker.notes;
     kind->footer(notes + (notes.empty() ? "" : "\n") + "Example: nurbs-shape make " + maker.kind + " " +
-                 *example++ + " -o " + maker.kind + ".json\n");
+                 maker.example + " -o " + maker.kind + ".json\n");
     options.emplace_back(kind, maker.options);
   }
   CLI::App* pebbles =
