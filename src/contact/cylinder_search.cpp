@@ -130,7 +130,8 @@ double find_inside(const Particle& particle, const Vec3& origin, const Vec3& axi
   const Vec3 apart = particle.x - origin;
   const double size = particle.scale * particle.shape->bounding_radius;
   Vec3 across = apart - apart.dot(axis) * axis;
-  if (across.norm() < kLevel * (size + apart.norm())) across.setZero();  // its direction would be round-off's
+  const double same = kLevel * (size + apart.norm());
+  if (across.norm() < same) across.setZero();  // its direction would be round-off's
   const double distance = across.norm();
   const Tube tube(particle, origin, axis, across);
   // F'' = (curvature radius of the body's outline) - F: where the body is everywhere more curved than the
@@ -167,7 +168,6 @@ double find_inside(const Particle& particle, const Vec3& origin, const Vec3& axi
   }
   // A round body along the axis of a narrower tube touches it all around, where slopes are round-off: of
   // maxima that F does not fall between, one stands for all.
-  const double same = kLevel * (size + apart.norm());
   const Reach* highest = &samples.at[0];
   double last_top = HUGE_VAL, least = -HUGE_VAL;  // of F since the last maximum
   for (int k = 1; k < samples.count; ++k) {

@@ -269,8 +269,10 @@ std::vector<Vec2> simplified(std::vector<Vec2> polygon, double error) {
     for (size_t k = 1; k + 1 < polygon.size(); ++k) {
       std::vector<Vec2> shorter = polygon;
       shorter.erase(shorter.begin() + static_cast<std::ptrdiff_t>(k));
-      double most = 0;
-      for (const Vec2& p : all) most = std::max(most, distance(p, shorter));
+      // The corner itself is mostly what is furthest: most others need not be looked at.
+      double most = distance(polygon[k], shorter);
+      for (size_t i = 0; i < all.size() && most <= least; ++i)
+        most = std::max(most, distance(all[i], shorter));
       if (most <= least) least = most, best = k;
     }
     if (best == 0) break;
