@@ -9,6 +9,7 @@
 #include "comm.h"
 #include "force.h"
 #include "liggghts/fix_wall_nurbs.h"
+#include "liggghts/host_rules.h"
 #include "liggghts/nurbs_contact.h"
 #include "liggghts/pair_gran_nurbs.h"
 #include "modify.h"
@@ -61,6 +62,11 @@ void FixContactHistoryNurbs::bequeath(Legacy legacy) {
   orphaned_ = true;
   pair_gran_ = nullptr;
   computeflag_ = nullptr;
+}
+
+int FixContactHistoryNurbs::n_history_extra() {
+  if (orphaned_) nurbs_host::refuse_pair_style(lmp);
+  return 0;
 }
 
 FixContactHistoryNurbs::Legacy FixContactHistoryNurbs::inherit() {

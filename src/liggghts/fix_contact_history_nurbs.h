@@ -40,6 +40,8 @@ class FixContactHistoryNurbs : public FixContactHistory {
   void unpack_restart(int i, int nth) override;
   int size_restart(int i) override;
   int maxsize_restart() override;
+  // A pair style asks every fix, first thing when it begins: the host's would stop at this one.
+  int n_history_extra() override;
 
   // What owned particle i remembered of the particle `tag` when the neighbour lists were last made; the host
   // forgets it where the bounding spheres are apart. Nothing when it remembered nothing.

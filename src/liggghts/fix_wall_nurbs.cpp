@@ -6,6 +6,7 @@
 #include <cstdlib>
 #include <cstring>
 #include <limits>
+#include <set>
 
 #include "atom.h"
 #include "comm.h"
@@ -254,6 +255,7 @@ void FixWallNurbs::warn_time_step() {
 void FixWallNurbs::setup(int vflag) {
   checked_particles_ = atom->natoms;
   post_force(vflag);
+  if (all(lmp).back() == this) sum_mesh_forces();
   warn_deep("at the start of the run");
 }
 
@@ -309,6 +311,21 @@ int FixWallNurbs::maxsize_restart() {
 void FixWallNurbs::setup_pre_force(int) {
   for (Mesh& mesh : meshes_)
     if (auto* stress = dynamic_cast<MeshModuleStress*>(mesh.fix->get_module("stress"))) stress->pre_force(0);
+}
+
+// The host sums them over triangles and ranks at the end of a step, and has none yet when a run begins. What
+// would be wear then is none: no time has passed.
+void FixWallNurbs::sum_mesh_forces() {
+  std::set<FixMeshSurface*> summed;
+  for (FixWallNurbs* wall : all(lmp))
+    for (Mesh& mesh : wall->meshes_) {
+      auto* stress = dynamic_cast<MeshModuleStress*>(mesh.fix->get_module("stress"));
+      if (stress == nullptr || !summed.insert(mesh.fix).second) continue;
+      if (auto* wear = mesh.fix->triMesh()->prop().getElementProperty<ScalarContainer<double> >("wear_step"))
+        wear->setAll(0.);
+      if (stress->trackStress()) mesh.fix->triMesh()->reverseComm(std::string("f"));
+      stress->final_integrate();
+    }
 }
 
 // Brings the copies of the meshes' nodes up to date; returns a way that no node has exceeded since the last

@@ -103,6 +103,7 @@ class FixWallNurbs : public Fix {
   void check_meshes();
   void compute_surface(nurbs::ContactStages::Step& step);
   void tell_meshes();
+  void sum_mesh_forces();
   int contacts_size(int i) const;
   void warn_periodic();
   void warn_time_step();

@@ -89,10 +89,7 @@ void warn_default_step(LAMMPS* lmp, std::set<std::string>* told) {
 
 // The pair style's own init has had its say by now.
 void check_pair_style(LAMMPS* lmp, std::set<std::string>* told) {
-  if (lmp->force->pair != nullptr && PairGranNurbs::find(lmp) == nullptr)
-    fail_all(FLERR, lmp,
-             std::string("atom_style nurbs needs pair_style gran/nurbs; pair_style ") +
-                 lmp->force->pair_style + " takes the particles for spheres");
+  if (lmp->force->pair != nullptr && PairGranNurbs::find(lmp) == nullptr) refuse_pair_style(lmp);
   if (lmp->force->pair != nullptr) return;
   const std::string missing = "atom_style nurbs: there is no pair_style gran/nurbs";
   if (lmp->atom->sortfreq > 0 &&
@@ -194,6 +191,12 @@ void warn_lost_walls(LAMMPS* lmp, std::set<std::string>* told) {
 }
 
 }  // namespace
+
+void refuse_pair_style(LAMMPS* lmp) {
+  fail_all(FLERR, lmp,
+           std::string("atom_style nurbs needs pair_style gran/nurbs; pair_style ") + lmp->force->pair_style +
+               " takes the particles for spheres");
+}
 
 void check_host(LAMMPS* lmp, std::set<std::string>* told) {
   check_settings(lmp);

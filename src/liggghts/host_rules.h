@@ -12,4 +12,7 @@ namespace LAMMPS_NS::nurbs_host {
 // warnings. When a run begins, after the pair style's init. Collective.
 void check_host(LAMMPS* lmp, std::set<std::string>* told);
 
+// Ends the run with the line for a pair style of the host's in the place of gran/nurbs. Collective.
+[[noreturn]] void refuse_pair_style(LAMMPS* lmp);
+
 }  // namespace LAMMPS_NS::nurbs_host

@@ -9,6 +9,7 @@
 #include "liggghts/compute_nurbs_energy.h"
 #include "liggghts/compute_nurbs_local.h"
 #include "liggghts/compute_nurbs_stats.h"
+#include "liggghts/compute_wall_gran_local_nurbs.h"
 #include "liggghts/dump_nurbs_vtk.h"
 #include "liggghts/fix_check_timestep_gran_nurbs.h"
 #include "liggghts/fix_contact_history_nurbs.h"

@@ -90,7 +90,7 @@ class SurfaceWall {
   SurfaceContacts contacts_;
   WallContact found_[kSurfaceContacts];
   Vec3 former_normals_[ContactStages::kMostListed];
-  bool former_flat_[ContactStages::kMostListed];
+  bool former_flat_[ContactStages::kMostListed] = {};
   std::deque<PlaneRegion> regions_;  // that flat features stand on, of this step: the first regions_used_
   std::size_t regions_used_ = 0;
   PairMemory former_memories_[ContactStages::kMostListed];

@@ -63,9 +63,12 @@ class Hints(unittest.TestCase):
                 ("compute q all erotate/sphere", "use compute erotate/nurbs"),
                 ("fix q all wall/nurbs primitive type 1 zplane 0.0", "write plane 0 0 C 0 0 1 type T"),
                 ("fix q all wall/nurbs plane 0 0 0 0 0 1", "or type T model NORMAL"),
+                ("compute q all wall/gran/local id force", "use compute nurbs/local, whose id2 is 0 at walls"),
+                ("run 1\npair_style gran model hertz tangential history", "pair_style gran takes the particles for spheres"),
                 ("pair_style gran/nurbs model hertz tolerance 1e-8", "tolerance must stand before model"),
                 ("pair_style gran/nurbs tangential history model hertz", "model NORMAL must stand before tangential")):
-            result = deck.run(DECK + line + "\nrun 0\n", files=files())
+            coefficients = "pair_coeff * *\n" if "pair_style gran model" in line else ""
+            result = deck.run(DECK + line + f"\n{coefficients}run 0\n", files=files())
             self.assertEqual((result.status, len(result.errors)), (1, 1), result.screen[-500:])
             self.assertIn(words, result.errors[0])
 

@@ -172,6 +172,28 @@ class Meshes(unittest.TestCase):
             np.testing.assert_allclose(table[f"m[{k}]"], value, rtol=0, atol=1e-6 * weight)  # step 0 of the second run too
             np.testing.assert_allclose(table[f"w[{k}]"], value, rtol=0, atol=1e-6 * weight)
 
+    def test_forces_on_the_mesh_are_there_when_a_run_begins(self):
+        """On any rank, whatever ran before; a run that begins wears nothing off."""
+        balls = [(k, 1, 1, 0.03, 2500.0, 0.08 * x, -0.05, 0.0299, 1.0, 0.0, 0.0, 0.0) for k, x in ((1, -1), (2, 1))]
+        slide = [(k, 0.5, 0.2, -0.3, 0.0, 0.0, 0.0) for k in (1, 2)]
+        worn = []
+        for ranks, steps in ((1, "run 0\nrun 0\nrun 100"), (2, "run 0\nrun 50\nrun 0\nrun 0\nrun 50"), (4, "run 50\nrun 0\nrun 50")):
+            out = run("mesh m", balls, slide, mesh=sheet(5, 0.18), body=shape("sphere", 1), steps=steps, ranks=ranks,
+                      before="fix k all property/global k_finnie peratomtypepair 1 1.0\n"
+                      "fix m all mesh/surface/stress file wall.stl type 1 wear finnie",
+                      thermo=" ".join(f"f_m[{k}]" for k in range(1, 7)), after="dump mesh all mesh/vtk 100 mesh*.vtk wear stress")
+            self.assertAlmostEqual(out.tables[0]["w[3]"][0], -2 * (10 + 20 * 0.3), delta=1e-6)
+            for table in out.tables:
+                for k in range(1, 7):
+                    np.testing.assert_allclose(table[f"m[{k}]"], table[f"w[{k}]"], rtol=0, atol=1e-9)
+            field = lambda step, name: sorted(float(word) for word in out.read(  # noqa: E731
+                f"mesh{step}.vtk").split(name + " 1 50 double")[1].split()[:50])
+            np.testing.assert_allclose(field(0, "normal_stress_average")[-2:], 16 / (0.072**2 / 2), rtol=1e-6)
+            self.assertEqual(field(0, "wear")[-1], 0)
+            worn.append(field(100, "wear"))
+            self.assertGreater(worn[-1][-1], 0)
+        np.testing.assert_allclose(worn[1:], worn[:1] * 2, rtol=1e-5)
+
     def test_periodic_borders(self):
         slide = [(1, 1, 1, 0.03, 2500.0, 0.15, 0.0, 0.024, 1.0, 0.0, 0.0, 0.0)]
         fast = [(1, 4.0, 1.0, 0, 0, 30.0, 0)]
