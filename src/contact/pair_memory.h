@@ -105,6 +105,32 @@ inline bool may_serve(double rate_a, double rate_b, double turned2_a, double tur
              0.5 * tolerance * std::fmax(std::abs(gap), kForceDepth * size);
 }
 
+// One body of a solved contact: its jet there in axes that `axes` turns into its own, lengths of the lab, its
+// centre of mass in those axes, and the square of what it has turned since the last solve, rad^2.
+struct ModelSide {
+  const Shape& shape;
+  double scale;
+  const SurfacePoint& at;
+  const JetLanes& jet;
+  Mat3 axes;
+  Vec3 center;
+  double turned2;
+};
+
+// The local model of a contact that is its pair's only one below an overlap of `unique`, and whose normal may
+// turn by `turn` rad before another support point takes over; none where it is not worth having.
+inline void make_local_model(const ModelSide& a, const ModelSide& b, double gap, double unique, double turn,
+                             double tolerance, double size, LocalModel* model) {
+  if (!(turn > 0)) return;
+  const LocalRate of_a = local_rate(a.shape, a.scale, a.at), of_b = local_rate(b.shape, b.scale, b.at);
+  if (!may_serve(of_a.rate, of_b.rate, a.turned2, b.turned2, gap, tolerance, size)) return;
+  if (!make_support_model(a.axes, a.center, a.jet, of_a, &model->a)) return;
+  if (!make_support_model(b.axes, b.center, b.jet, of_b, &model->b)) return;
+  limit_turn(a.shape, a.scale, turn, &model->a);
+  limit_turn(b.shape, b.scale, turn, &model->b);
+  model->unique = unique;
+}
+
 inline void set_local(const LocalContact& c, const Vec3& offset, double reach, ContactResult* r) {
   const double error = c.error + kRoundoff * offset.lpNorm<1>();
   r->rung = Rung::local_model;

@@ -340,16 +340,11 @@ class Ladder {
   }
 
   void remember_model(const PairFrame& pair, const JointSolution& s, double turned2_a, double turned2_b) {
-    if (!(s.turn > 0)) return;
-    const LocalRate local_a = local_rate(*pair.a, pair.scale_a, s.base_a),
-                    local_b = local_rate(*pair.b, pair.scale_b, s.base_b);
-    if (!may_serve(local_a.rate, local_b.rate, turned2_a, turned2_b, s.gap, settings_.tolerance, pair.size))
-      return;
-    if (!make_support_model(Mat3::Identity(), Vec3::Zero(), s.jet_a, local_a, &memory_.model.a)) return;
-    if (!make_support_model(pair.turn.transpose(), pair.offset, s.jet_b, local_b, &memory_.model.b)) return;
-    limit_turn(*pair.a, pair.scale_a, s.turn, &memory_.model.a);
-    limit_turn(*pair.b, pair.scale_b, s.turn, &memory_.model.b);
-    memory_.model.unique = 0.5 * s.bracket.unique;
+    const ModelSide a{*pair.a, pair.scale_a, s.base_a, s.jet_a, Mat3::Identity(), Vec3::Zero(), turned2_a};
+    const ModelSide b{*pair.b,     pair.scale_b, s.base_b, s.jet_b, pair.turn.transpose(),
+                      pair.offset, turned2_b};
+    make_local_model(a, b, s.gap, 0.5 * s.bracket.unique, s.turn, settings_.tolerance, pair.size,
+                     &memory_.model);
   }
 
   const Particle &a_, &b_;

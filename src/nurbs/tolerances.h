@@ -163,8 +163,9 @@ constexpr double kLargestStep = 0.35;  // of a patch's parameter range in one Ne
 constexpr double kNormalTrust = 0.3;  // relative change of a tangent beyond which a step's normal is not used
 constexpr double kNearPole =
     1e-4;  // ratio of the tangents' lengths below which a plane's warm solve hands on
-constexpr int kWarmIterations = 4;     // 1 or 2 are usual
-constexpr int kPolishIterations = 12;  // from a cold start
+constexpr int kWarmIterations = 4;      // 1 or 2 are usual
+constexpr int kFollowedIterations = 3;  // of pairs side by side; the ladder takes over
+constexpr int kPolishIterations = 12;   // from a cold start
 
 // --- ellipsoids in closed form
 constexpr int kEllipsoidSteps = 4;          // of Newton for a contact that goes on; 1 or 2 are usual ...

@@ -38,6 +38,7 @@ struct alignas(64) ContactStages::Results {
   double normal[3][kBlock], point[3][kBlock], offset[3][kBlock];  // point: midpoint of the two
   double touching[kBlock] = {};                                   // 1 or 0
   double served[kBlock] = {};
+  int iterations[kBlock] = {};  // of those served by Newton
 
   void set(int lane, const ContactResult& r, const Vec3& separation) {
     gap[lane] = r.gap;

@@ -7,42 +7,17 @@
 #include "contact/ellipsoid_search.h"
 #include "laws/linear_law.h"
 #include "reference/cso.h"
+#include "scene/block_lanes.h"
 #include "scene/contact_results.h"
 
 namespace nurbs {
 namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
-constexpr int kUnique = kLocalModelSize - 1;
 constexpr double kSamePose =
     1e-6;  // of the smaller radius: bodies that a new run finds nearer were not moved
 constexpr double kBudgetShare = 1 - 1e-12;  // of a proven gap: sums of paths are rounded
 
-// Numbers `field` ... of the contacts `first` to first + kWidth - 1 of a block.
-NURBS_INLINE Wide lanes(const ContactBlock& block, int field, int first) {
-  Wide w;
-  std::memcpy(&w, &block.field[field][first], sizeof w);
-  return w;
-}
-NURBS_INLINE Triple<Wide> lanes3(const ContactBlock& block, int field, int first) {
-  return {lanes(block, field, first), lanes(block, field + 1, first), lanes(block, field + 2, first)};
-}
-NURBS_INLINE SupportModelOf<Wide> support_lanes(const ContactBlock& block, int field, int first) {
-  return {lanes3(block, field, first),     lanes3(block, field + 3, first), lanes3(block, field + 6, first),
-          lanes(block, field + 9, first),  lanes(block, field + 10, first), lanes(block, field + 11, first),
-          lanes(block, field + 12, first), lanes(block, field + 13, first)};
-}
-
-struct Pose {
-  Triple<Wide> x;
-  Turn<Wide> turn;
-  Wide radius, free;
-};
-NURBS_INLINE Pose gather_pose(const double* const (&record)[kWidth]) {
-  Wide f[16];
-  gather(record, f);
-  return {{f[0], f[1], f[2]}, {{{f[3], f[4], f[5]}, {f[6], f[7], f[8]}, {f[9], f[10], f[11]}}}, f[12], f[13]};
-}
 NURBS_INLINE BodyMotionOf<Wide> gather_motion(const double* const (&record)[kWidth]) {
   Wide f[16];
   gather(record, f);
@@ -398,15 +373,10 @@ void ContactStages::serve(ContactBlock& block, int first, Results& results) cons
   const Pose a = gather_pose(of_a), b = gather_pose(of_b);
   const Triple<Wide> offset = b.x - a.x;
   const auto put = [first](const WideMask& mask, const Wide& w, double(&to)[kBlock]) {
-    Wide old;
-    std::memcpy(&old, &to[first], sizeof old);
-    old = select(mask, w, old);
-    std::memcpy(&to[first], &old, sizeof old);
+    put_lanes(mask, w, first, to);
   };
-  const auto put3 = [&](const WideMask& mask, const Triple<Wide>& w, double(&to)[3][kBlock]) {
-    put(mask, w.x, to[0]);
-    put(mask, w.y, to[1]);
-    put(mask, w.z, to[2]);
+  const auto put3 = [first](const WideMask& mask, const Triple<Wide>& w, double(&to)[3][kBlock]) {
+    put_lanes(mask, w, first, to);
   };
   const Wide zero{}, one = all<Wide>(1);
   const auto answer = [&](const WideMask& asked, const Answer& c) {
@@ -473,6 +443,7 @@ void ContactStages::compute_block(ContactBlock& block) {
     if (!(block.used >> lane & 1) || results.served[lane] != 0 || block.fresh[lane] != 0) continue;
     prefetch_pair(block.a[lane], block.b[lane], block.proof[lane]);
   }
+  for (int first = 0; first < kBlock; first += kWidth) follow_surfaces(block, first, results);
   double touching = 0;
   for (int lane = 0; lane < kBlock; ++lane) {
     if (!(block.used >> lane & 1)) {
@@ -485,14 +456,16 @@ void ContactStages::compute_block(ContactBlock& block) {
       results.touching[lane] = 0;
       continue;
     }
-    const bool local = block.fresh[lane] == 0 && results.served[lane] != 0;
+    const bool served = block.fresh[lane] == 0 && results.served[lane] != 0;
     if (block.fresh[lane] != 0) {
       results.set(lane, fresh_[block.fresh[lane] - 1], offset(a, b));
       block.fresh[lane] = 0;
-    } else if (local) {
+    } else if (served) {
       const double weight = share(a, b);
-      counts_.value[ContactCounts::local_model] += weight;
+      const bool followed = results.iterations[lane] != 0;
+      counts_.value[followed ? ContactCounts::warm : ContactCounts::local_model] += weight;
       counts_.value[ContactCounts::contacts] += weight * results.touching[lane];
+      counts_.value[ContactCounts::iterations] += weight * results.iterations[lane];
     } else {
       solve_lane(block, lane, results);
     }
@@ -516,7 +489,7 @@ void ContactStages::compute_block(ContactBlock& block) {
     }
     close(block, lane);
     if (!(results.lower[lane] > 0)) continue;
-    if (local) {
+    if (served) {
       PairProof& proof = *block.proof[lane];
       const Vec3 apart = a < 0 ? Vec3(step_.wall_normal.dot(offset(a, b)) * step_.wall_normal) : offset(a, b);
       set_proof(results.normal_of(lane), results.lower[lane], apart,

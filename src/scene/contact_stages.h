@@ -2,7 +2,7 @@
 //   (a) per body, once: scene/bodies.h
 //   (b) budgets: neighbours that cannot have come together since they were proven apart
 //   (c) local models of all contacts, closed forms of ellipsoids (eight side by side)
-//   (d) solves for the rest: the contact search, one pair at a time
+//   (d) solves for the rest: contacts that go on side by side, then the contact search, one pair at a time
 //   (e) the law                               (eight side by side)
 //   (f) sums of forces, independent of the order of the pairs
 // (c) to (f) go block by block, while a block is in the cache. The host owns the proofs of its neighbours
@@ -215,6 +215,7 @@ class ContactStages {
   void prefetch_pair(int a, int b, const PairProof* proof) const;
   void compute_block(ContactBlock& block);
   void serve(ContactBlock& block, int first, Results& results) const;
+  void follow_surfaces(ContactBlock& block, int first, Results& results) const;
   void solve_lane(ContactBlock& block, int lane, Results& results);
   void start_run(ContactBlock& block, int lane, const Results& results);
   void close(ContactBlock& block, int lane);

@@ -10,6 +10,7 @@
 
 #include "body/support.h"
 #include "contact/contact.h"
+#include "nurbs/wide.h"
 #include "support/families.h"
 
 namespace nurbs::families {
@@ -36,6 +37,28 @@ TEST(FailureFamilies, no_answer_of_ours_fails) {
           << family.name << ", pair " << k << ": " << kFailureNames[static_cast<int>(verdict.failure)]
           << ", error " << verdict.error << ", allowed " << verdict.allowed;
     }
+}
+
+// Contacts that go on, side by side: what is found there is right, whatever the family and the lane, and
+// most contacts of smooth bodies are found.
+TEST(FailureFamilies, no_contact_followed_side_by_side_fails) {
+  long given = 0, asked = 0;
+  for (const Family& family : all_families())
+    for (long k = 0; k < sample_of(family); ++k) {
+      const PairCase pair = pair_of(family, k);
+      if (pair.truth.gap > 0) continue;
+      const Answer answer = follow(pair, static_cast<int>(k % kWidth));
+      ++asked;
+      if (!answer.given) continue;
+      ++given;
+      const Verdict verdict = judge(pair, answer);
+      EXPECT_EQ(verdict.failure, Failure::none)
+          << family.name << ", pair " << k << ": " << kFailureNames[static_cast<int>(verdict.failure)]
+          << ", error " << verdict.error << ", allowed " << verdict.allowed;
+      const Answer alone = follow(pair, static_cast<int>((k + 1) % kWidth));
+      EXPECT_TRUE(alone.given && alone.gap == answer.gap && alone.normal == answer.normal);
+    }
+  EXPECT_GT(given, asked / 10);
 }
 
 const Family& family_named(const std::string& name) {

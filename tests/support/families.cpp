@@ -9,6 +9,8 @@
 #include <memory>
 
 #include "body/support.h"
+#include "contact/joint_lanes.h"
+#include "contact/pair_memory.h"
 #include "contact/pair_search.h"
 #include "nurbs/tolerances.h"
 #include "shapes/primitives.h"
@@ -793,6 +795,63 @@ Answer solve(const PairCase& c, Solver solver) {
   answer.rung = static_cast<int>(r.rung);
   answer.lower = r.lower;
   answer.upper = r.upper;
+  return answer;
+}
+
+Answer follow(const PairCase& c, int lane) {
+  double memory[kPairMemorySize] = {0};
+  ContactSettings settings;
+  settings.tolerance = c.tolerance;
+  const double small = 1e-3;
+  Particle before = c.b;
+  before.q = (Quat(Eigen::AngleAxisd(small, Vec3(0.6, -0.48, 0.64))) * c.b.q).normalized();
+  before.x += small * c.b.scale * c.b.shape->bounding_radius * Vec3(0.48, 0.64, 0.6);
+  find_contact(c.a, before, settings, memory);
+  const PairMemory& known = memory_at(memory);
+  Answer answer;
+  answer.given = false;
+  const SurfacePoint on_a = warm_point(known.on_a, *c.a.shape), on_b = warm_point(known.on_b, *c.b.shape);
+  if (known.on_a.patch < 0 || known.on_b.patch < 0) return answer;
+
+  JointLanes pairs{};
+  const auto set_turn = [&](const Quat& q, Turn<Wide>* to) {
+    const Turn<double> m = turn(q.normalized().toRotationMatrix());
+    for (int k = 0; k < 3; ++k) {
+      to->row[k].x[lane] = m.row[k].x;
+      to->row[k].y[lane] = m.row[k].y;
+      to->row[k].z[lane] = m.row[k].z;
+    }
+  };
+  const double ra = c.a.scale * c.a.shape->bounding_radius, rb = c.b.scale * c.b.shape->bounding_radius;
+  const Vec3 offset = c.b.x - c.a.x;
+  pairs.a[lane] = c.a.shape;
+  pairs.b[lane] = c.b.shape;
+  pairs.on_a[lane] = on_a;
+  pairs.on_b[lane] = on_b;
+  pairs.scale_a[lane] = c.a.scale;
+  pairs.scale_b[lane] = c.b.scale;
+  set_turn(c.a.q, &pairs.turn_a);
+  set_turn(c.b.q, &pairs.turn_b);
+  pairs.offset.x[lane] = offset[0];
+  pairs.offset.y[lane] = offset[1];
+  pairs.offset.z[lane] = offset[2];
+  pairs.size[lane] = std::min(ra, rb);
+  pairs.reach[lane] = std::max(ra, rb);
+  pairs.tolerance[lane] = std::max(c.tolerance * std::min(ra, rb), kLeastTolerance * std::max(ra, rb));
+  if (follow_joints(1u << lane, std::numeric_limits<double>::infinity(), &pairs) == 0) return answer;
+  const auto at = [lane](const Triple<Wide>& v) { return Vec3(v.x[lane], v.y[lane], v.z[lane]); };
+  answer.given = answer.has_normal = answer.has_bracket = answer.has_points = true;
+  answer.rung = static_cast<int>(Rung::warm);
+  answer.gap = pairs.gap[lane];
+  answer.lower = pairs.lower[lane];
+  answer.upper = pairs.upper[lane];
+  answer.normal = at(pairs.normal);
+  // As a result's, whose points are the gap apart.
+  answer.point_a = at(pairs.point_a);
+  answer.point_b = at(pairs.point_b);
+  const Vec3 shift = 0.5 * (answer.gap - answer.normal.dot(answer.point_b - answer.point_a)) * answer.normal;
+  answer.point_a -= shift;
+  answer.point_b += shift;
   return answer;
 }
 

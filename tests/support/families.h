@@ -80,4 +80,8 @@ Verdict judge(const PairCase& pair, const Answer& answer, double mesh_error = 0)
 
 Answer solve(const PairCase& pair, Solver solver);
 
+// The same by Newton side by side, going on from the default solver's answer where B stood before a small
+// motion; `lane` is where. Not given where that leaves the pair to the ladder.
+Answer follow(const PairCase& pair, int lane);
+
 }  // namespace nurbs::families

@@ -1,0 +1,103 @@
+// Stage (d) for contacts that go on: Newton on the surfaces, side by side (contact/joint_lanes.h). What is
+// not found here is solved one at a time.
+#include <algorithm>
+
+#include "contact/joint_lanes.h"
+#include "scene/block_lanes.h"
+#include "scene/contact_results.h"
+
+namespace nurbs {
+namespace {
+
+constexpr int kPoints = kLocalModelSize;  // field of on_a; on_b follows
+
+// Whether a contact was solved on both surfaces the last time, and a plain Newton may go on from there.
+bool goes_on(const ContactBlock& block, int lane) {
+  return (block.used >> lane & 1) && block.fresh[lane] == 0 && block.a[lane] >= 0 &&
+         block.field[kFlat][lane] == 0 && !is_mark(block.field[kUnique][lane]) &&
+         block.field[kPoints][lane] >= 0 && block.field[kPoints + 5][lane] >= 0;
+}
+
+}  // namespace
+
+void ContactStages::follow_surfaces(ContactBlock& block, int first, Results& results) const {
+  if (step_.wall != nullptr || step_.settings.solver != Solver::ladder) return;
+  JointLanes pairs;
+  unsigned asked = 0;
+  const double *of_a[kWidth], *of_b[kWidth];
+  for (int l = 0; l < kWidth; ++l) {
+    const int lane = first + l;
+    of_a[l] = of_b[l] = step_.bodies->record(0).x;
+    pairs.scale_a[l] = pairs.scale_b[l] = 1;
+    if (results.served[lane] != 0 || !goes_on(block, lane)) continue;
+    const int a = block.a[lane], b = block.b[lane];
+    const Particle pa = step_.bodies->particle(a), pb = step_.bodies->particle(b);
+    if (pa.shape->ellipsoid.found && pb.shape->ellipsoid.found) continue;  // have a closed form
+    PointMemory on[2];
+    block.get(lane, kPoints, 10, on);
+    pairs.on_a[l] = warm_point(on[0], *pa.shape);
+    pairs.on_b[l] = warm_point(on[1], *pb.shape);
+    pairs.a[l] = pa.shape;
+    pairs.b[l] = pb.shape;
+    pairs.scale_a[l] = pa.scale;
+    pairs.scale_b[l] = pb.scale;
+    of_a[l] = record(a).x;
+    of_b[l] = record(b).x;
+    asked |= 1u << l;
+  }
+  if (asked == 0) return;
+  const Pose a = gather_pose(of_a), b = gather_pose(of_b);
+  pairs.turn_a = a.turn;
+  pairs.turn_b = b.turn;
+  pairs.offset = b.x - a.x;
+  pairs.size = smaller(a.radius, b.radius);
+  pairs.reach = larger(a.radius, b.radius);
+  pairs.tolerance = larger<Wide>(step_.settings.tolerance * pairs.size, kLeastTolerance * pairs.reach);
+  const unsigned found = follow_joints(asked, step_.settings.reach, &pairs);
+  if (found == 0) return;
+
+  WideMask mask;
+  for (int l = 0; l < kWidth; ++l) mask[l] = found >> l & 1 ? -1 : 0;
+  const Wide one = all<Wide>(1);
+  put_lanes(mask, pairs.gap, first, results.gap);
+  put_lanes(mask, pairs.lower, first, results.lower);
+  put_lanes(mask, pairs.normal, first, results.normal);
+  put_lanes(mask, all<Wide>(0.5) * (pairs.point_a + pairs.point_b), first, results.point);
+  put_lanes(mask, pairs.offset, first, results.offset);
+  put_lanes(mask, select(pairs.gap < 0.0, one, Wide{}), first, results.touching);
+  put_lanes(mask, one, first, results.served);
+  for (int l = 0; l < kWidth; ++l)
+    if (found >> l & 1) results.iterations[first + l] = pairs.iterations[l];
+  if (step_.setup) return;  // what is remembered stays, so that a run in two parts moves as one
+
+  for (int l = 0; l < kWidth; ++l) {
+    if (!(found >> l & 1)) continue;
+    const int lane = first + l;
+    const Particle pa = step_.bodies->particle(block.a[lane]), pb = step_.bodies->particle(block.b[lane]);
+    PairProof& proof = *block.proof[lane];
+    LocalModel model;
+    drop_model(&model);
+    scale(pa.scale, &pairs.jet_a[l]);
+    scale(pb.scale, &pairs.jet_b[l]);
+    const auto side = [](const Particle& p, const SurfacePoint& at, const JetLanes& jet, const double* q) {
+      return ModelSide{*p.shape, p.scale, at, jet, Mat3::Identity(), Vec3::Zero(), turned2(p.q, q)};
+    };
+    make_local_model(side(pa, pairs.base_a[l], pairs.jet_a[l], proof.q_a),
+                     side(pb, pairs.base_b[l], pairs.jet_b[l], proof.q_b), pairs.gap[l],
+                     0.5 * pairs.unique[l], pairs.dented[l] ? 0 : kNormalMargin, step_.settings.tolerance,
+                     pairs.size[l], &model);
+    if (model.unique > 0)
+      block.set(lane, 0, kLocalModelSize, &model);
+    else
+      block.field[kUnique][lane] = model.unique;
+    PointMemory on[2];
+    block.get(lane, kPoints, 10, on);
+    remember_point(pairs.on_a[l], &on[0]);
+    remember_point(pairs.on_b[l], &on[1]);
+    block.set(lane, kPoints, 10, on);
+    set_proof({pairs.direction.x[l], pairs.direction.y[l], pairs.direction.z[l]}, pairs.lower[l],
+              {pairs.offset.x[l], pairs.offset.y[l], pairs.offset.z[l]}, pa.q, pb.q, &proof);
+  }
+}
+
+}  // namespace nurbs
