@@ -12,6 +12,7 @@
 
 #include "bench/bodies.h"
 #include "bench/machine.h"
+#include "bench/staged_pairs.h"
 #include "body/support.h"
 #include "contact/direction_search.h"
 #include "contact/pair_memory.h"
@@ -27,6 +28,7 @@ constexpr double kTurn = 2e-3;           // rad per step, either body
 constexpr double kRest = 1e-6;           // of the size: motion of a resting pair since its last solve
 constexpr int kBatches = 15;             // medians are of so many
 constexpr int kColdPairs = 100000;
+constexpr int kCopies = 20;  // of a path in the stages of a step
 
 struct Scene {
   const Body* body;
@@ -274,6 +276,56 @@ void cold(benchmark::State& state, int which, Solver solver) {
   }
 }
 
+// The same in the stages of a step, eight pairs side by side where it can be, contacts with their law: per
+// pair. Bodies that stay put but for `rest`, a neighbour's motion; in contact or, `away`, apart. One
+// iteration is one step.
+void staged_rest(benchmark::State& state, int which, double away) {
+  Random random(7);
+  std::vector<std::vector<Pair>> paths;
+  for (const auto& path : scene(which).paths) {
+    Pair pair = path[0];
+    pair.b.x *= away;
+    paths.push_back({pair, pair});
+    paths.back()[1].b.x += kRest * random.direction();
+    paths.back()[1].a.q = (Quat(Eigen::AngleAxisd(kRest, random.direction())) * pair.a.q).normalized();
+  }
+  StagedPairs pairs(paths, kCopies);
+  for (int i = 0; i < 4; ++i) {
+    pairs.place(i % 2);
+    pairs.compute();
+  }
+  int i = 0;
+  for (auto _ : state) {
+    pairs.place(i++ % 2);
+    const double start = thread_seconds();
+    pairs.compute();
+    state.SetIterationTime(std::max(1e-9, thread_seconds() - start - clock_cost()) / pairs.pairs());
+  }
+  state.counters["served"] =
+      pairs.counts().value[away > 1 ? ContactCounts::safe : ContactCounts::local_model] / pairs.pairs();
+}
+
+// One iteration is the whole of all paths.
+void staged_turning(benchmark::State& state, int which) {
+  const Scene& s = scene(which);
+  double warm = 0;
+  for (auto _ : state) {
+    StagedPairs pairs(s.paths, kCopies);
+    double spent = 0;
+    for (int i = 0; i < kSteps; ++i) {
+      pairs.place(i);
+      const double start = thread_seconds();
+      pairs.compute();
+      if (i < 2) continue;
+      spent += thread_seconds() - start - clock_cost();
+      warm = (pairs.counts().value[ContactCounts::warm] + pairs.counts().value[ContactCounts::local_model]) /
+             pairs.pairs();
+    }
+    state.SetIterationTime(spent / ((kSteps - 2) * pairs.pairs()));
+  }
+  state.counters["warm share"] = warm;
+}
+
 // One body's part of a step: both half kicks of velocity and angular momentum, the drift of place and
 // orientation, and the angular velocity at both ends, eight bodies a time. Free but for a small torque.
 void integration(benchmark::State& state, int which) {
@@ -333,6 +385,8 @@ double quantile(std::vector<double> x, double q) {
   return x[static_cast<size_t>(q * (x.size() - 1) + 0.5)];
 }
 
+constexpr const char* kByHand[] = {"/turning", "/plane", "/step:"};  // kernels that time themselves
+
 // Collects every repetition of every benchmark, named body/kernel.
 class Collector : public benchmark::BenchmarkReporter {
  public:
@@ -349,8 +403,9 @@ class Collector : public benchmark::BenchmarkReporter {
         continue;
       }
       Row& row = find(name);
-      const bool manual =
-          name.find("/turning") != std::string::npos || name.find("/plane") != std::string::npos;
+      const bool manual = std::any_of(std::begin(kByHand), std::end(kByHand), [&](const char* kernel) {
+        return name.find(kernel) != std::string::npos;
+      });
       row.ns.push_back(manual ? run.GetAdjustedRealTime() : run.GetAdjustedCPUTime());
       for (const auto& c : run.counters) row.counters[c.first] = c.second;
     }
@@ -396,6 +451,15 @@ std::vector<std::string> register_all() {
     add("plane, resting", [=](benchmark::State& s) { plane(s, which, kRest); })
         ->UseManualTime()
         ->Iterations(kPaths);
+    add("step: skipped neighbour", [=](benchmark::State& s) { staged_rest(s, which, 1.1); })
+        ->UseManualTime()
+        ->Iterations(50);
+    add("step: resting contact", [=](benchmark::State& s) { staged_rest(s, which, 1); })
+        ->UseManualTime()
+        ->Iterations(50);
+    add("step: turning contact", [=](benchmark::State& s) { staged_turning(s, which); })
+        ->UseManualTime()
+        ->Iterations(2);
     add("integration", [=](benchmark::State& s) { integration(s, which); });
     add("cold", [=](benchmark::State& s) { cold(s, which, Solver::ladder); });
     add("cold cso", [=](benchmark::State& s) { cold(s, which, Solver::cso); });
