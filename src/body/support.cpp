@@ -355,19 +355,32 @@ Support find_hull_support(const Shape& shape, const Vec3& d, const SurfacePoint*
   return is_certain(shape, local, enough) ? local : search_patches(shape, d, local);
 }
 
-double find_rival(const Shape& shape, const Vec3& d, const Support& best) {
-  double rival = -std::numeric_limits<double>::infinity();
-  if (!shape.dented()) return rival;
-  const double radius = shape.normal_map.radius_at(d);
-  if (radius < kFarAway) return rival;  // no dent near d: the only point with this normal
+Support confirm_support(const Shape& shape, const Vec3& d, const SurfacePoint& at) {
+  const Jet1 jet = evaluate1(shape.patches[at.patch], at.u, at.v);
+  const Normal normal = normal_at(shape, jet.su, jet.sv);
+  Support s;
+  s.where = at;
+  s.point = jet.s;
+  s.normal = std::isfinite(normal.noise) ? normal.n : d;
+  s.h = d.dot(jet.s);
+  s.upper = s.h + excess_at(shape, d, at, normal) + kRoundoff * shape.bounding_radius;
+  s.converged = true;
+  return is_certain(shape, s, 0) ? s : search_patches(shape, d, s);
+}
+
+bool find_rival(const Shape& shape, const Vec3& d, const Support& best, Support* rival) {
+  if (!shape.dented() || shape.normal_map.radius_at(d) < kFarAway)
+    return false;  // no dent near d: the only point with this normal
   int nodes[4];
   shape.atlas.cell(d, nodes);
+  bool found = false;
   for (const int node : nodes) {
     const Support other = climb(shape, d, shape.atlas.where[node]);
-    if ((other.point - best.point).norm() > kSameSupport * shape.bounding_radius)
-      rival = std::max(rival, std::min(best.h, other.h));
+    if ((other.point - best.point).norm() <= kSameSupport * shape.bounding_radius) continue;
+    if (!found || other.h > rival->h) *rival = other;
+    found = true;
   }
-  return rival;
+  return found;
 }
 
 SurfacePoint walk(const Shape& shape, SurfacePoint at, double du, double dv) {

@@ -32,9 +32,12 @@ Support find_support(const Shape& shape, const Vec3& d, const SurfacePoint* star
 Support find_hull_support(const Shape& shape, const Vec3& d, const SurfacePoint* start = nullptr,
                           double enough = 0);
 
-// Of a body with dents: h of the best other local maximum reached from the corners of d's atlas cell, which
-// lie on either side of the groove that d bridges; -infinity if there is none.
-double find_rival(const Shape& shape, const Vec3& d, const Support& best);
+// The same knowing a point that has d as its normal, or nearly.
+Support confirm_support(const Shape& shape, const Vec3& d, const SurfacePoint& at);
+
+// Of a body with dents: the best other local maximum reached from the corners of d's atlas cell, which lie on
+// either side of the groove that d bridges; false if there is none.
+bool find_rival(const Shape& shape, const Vec3& d, const Support& best, Support* rival);
 
 // Step (du, dv) from `at` in its patch's parameters, carried across edges through the links (orientation and
 // patch changes); collapsed edges and unmatched ends clamp.

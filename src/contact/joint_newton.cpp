@@ -219,7 +219,7 @@ JointSolution solve_joint(const PairFrame& pair, const SurfacePoint& on_a, const
     p.na = na.direction;
     p.nb = nb.direction;
     out.bracket = certify(pair, p);
-    out.turn = out.bracket.dented ? 0 : kNormalMargin;
+    out.dented = out.bracket.dented;
     out.converged = close_enough(out.bracket, tolerance, pair.size) || far_enough(out.bracket, enough);
     out.stationary = !out.converged && is_stationary(pair, p);
     const Forms a(out.jet_a, p.na), b(out.jet_b, p.na);

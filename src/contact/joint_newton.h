@@ -13,7 +13,7 @@ struct JointSolution {
   Bracket bracket;              // certified, of the pair of points evaluated last
   Vec3 normal;                  // unit, from A towards B
   double gap;      // normal . (b - a) at the refined points, error O(angle^3), kept inside the bracket
-  double turn;     // rad that the normal may turn before another support point takes over, as far as is known
+  bool dented;     // a dent may be near: another support point may be about to take over
   int iterations;  // Newton systems solved
   bool converged =
       false;  // bracket no wider than the tolerance asked for, or the gap proven larger than `enough`

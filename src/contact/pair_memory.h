@@ -117,15 +117,20 @@ struct ModelSide {
   double turned2;
 };
 
+// Whether a model of such a contact, at that gap, would serve.
+inline bool is_worth_a_model(const ModelSide& a, const ModelSide& b, double gap, double tolerance,
+                             double size) {
+  return may_serve(local_rate(a.shape, a.scale, a.at).rate, local_rate(b.shape, b.scale, b.at).rate,
+                   a.turned2, b.turned2, gap, tolerance, size);
+}
+
 // The local model of a contact that is its pair's only one below an overlap of `unique`, and whose normal may
-// turn by `turn` rad before another support point takes over; none where it is not worth having.
-inline void make_local_model(const ModelSide& a, const ModelSide& b, double gap, double unique, double turn,
-                             double tolerance, double size, LocalModel* model) {
+// turn by `turn` rad before another support point takes over; none where there can't be one.
+inline void make_local_model(const ModelSide& a, const ModelSide& b, double unique, double turn,
+                             LocalModel* model) {
   if (!(turn > 0)) return;
-  const LocalRate of_a = local_rate(a.shape, a.scale, a.at), of_b = local_rate(b.shape, b.scale, b.at);
-  if (!may_serve(of_a.rate, of_b.rate, a.turned2, b.turned2, gap, tolerance, size)) return;
-  if (!make_support_model(a.axes, a.center, a.jet, of_a, &model->a)) return;
-  if (!make_support_model(b.axes, b.center, b.jet, of_b, &model->b)) return;
+  if (!make_support_model(a.axes, a.center, a.jet, local_rate(a.shape, a.scale, a.at), &model->a)) return;
+  if (!make_support_model(b.axes, b.center, b.jet, local_rate(b.shape, b.scale, b.at), &model->b)) return;
   limit_turn(a.shape, a.scale, turn, &model->a);
   limit_turn(b.shape, b.scale, turn, &model->b);
   model->unique = unique;

@@ -3,7 +3,9 @@
 
 #include <cmath>
 #include <cstring>
+#include <limits>
 
+#include "contact/crease_search.h"
 #include "contact/deep_search.h"
 #include "contact/direction_search.h"
 #include "contact/ellipsoid_search.h"
@@ -12,7 +14,6 @@
 #include "contact/pair_memory.h"
 #include "contact/polytope.h"
 #include "contact/sphere_search.h"
-#include "contact/support_turn.h"
 #include "reference/cso.h"
 
 namespace nurbs {
@@ -105,7 +106,7 @@ class Ladder {
                                   tolerance, settings_.reach, kWarmIterations);
     r->iterations = s.iterations;
     if (!s.converged && !confirm(pair, tolerance, s)) {
-      if (meet_crease(pair, tolerance, s)) {
+      if (meet_edge(pair, tolerance, &s)) {
         *r = finish(pair, s, s.normal, Rung::warm, s.iterations);
         return true;
       }
@@ -124,83 +125,25 @@ class Ladder {
     const double excess = pair.scale_a * pair.a->support_excess + pair.scale_b * pair.b->support_excess;
     if (!s.stationary || excess <= 0.1 * tolerance || s.bracket.width() > 2 * excess + tolerance)
       return false;
-    const Support a = find_hull_support(*pair.a, s.normal, &s.points.on_a);
-    const Support b = find_hull_support(*pair.b, pair.direction_on_b(s.normal), &s.points.on_b);
+    const Support a = confirm_support(*pair.a, s.normal, s.points.on_a),
+                  b = confirm_support(*pair.b, pair.direction_on_b(s.normal), s.points.on_b);
     const double p = pair.scale_a * a.upper + pair.scale_b * b.upper - s.normal.dot(pair.offset);
     if (-p > s.bracket.lower) {
       s.bracket.lower = -p;
       s.bracket.direction = s.normal;
     }
-    // Two supports differ by at most the diameter times the turn more than they did.
-    const double rival_a = find_rival(*pair.a, s.normal, a),
-                 rival_b = find_rival(*pair.b, pair.direction_on_b(s.normal), b);
-    const double clear =
-        std::min((a.h - rival_a) / pair.a->bounding_radius, (b.h - rival_b) / pair.b->bounding_radius);
-    s.turn = std::min(0.25 * clear, kNormalMargin);
     s.converged = s.bracket.width() <= tolerance;
     if (s.converged) s.gap = std::clamp(s.gap, s.bracket.lower, s.bracket.upper);
     return s.converged;
   }
 
-  // A contact on a crease, where the surfaces have no common normal: Newton on p(d) from the last direction,
-  // its gradient the offset of the supports across d, its Hessian W_A + W_B - p with what a crease leaves of
-  // W. The certificate is that of certificate.h, with no ball in the body whose normal is not d.
-  bool meet_crease(const PairFrame& pair, double tolerance, JointSolution& s) const {
+  // A contact on a crease or over a dent, where the surfaces have no common normal.
+  bool meet_edge(const PairFrame& pair, double tolerance, JointSolution* s) const {
     if (memory_.proof.contact == 0 || !has_proof(memory_.proof) || (pair.a->smooth && pair.b->smooth))
       return false;
-    JointSolution c;
-    PointPair& p = c.points;
-    Vec3 d = pair.axes_a.transpose() * load(memory_.proof.direction);
-    const SurfacePoint *from_a = &s.points.on_a, *from_b = &s.points.on_b;
-    for (int k = 0; k < kWarmIterations; ++k) {
-      const Vec3 on_b = pair.direction_on_b(d);
-      const Support sa = find_hull_support(*pair.a, d, from_a, kSupportShare * tolerance / pair.scale_a),
-                    sb = find_hull_support(*pair.b, on_b, from_b, kSupportShare * tolerance / pair.scale_b);
-      p.a = pair.place_a(sa.point);
-      p.b = pair.place_b(sb.point);
-      p.on_a = sa.where;
-      p.on_b = sb.where;
-      from_a = &p.on_a;
-      from_b = &p.on_b;
-      const double upper = pair.scale_a * sa.upper + pair.scale_b * sb.upper - d.dot(pair.offset);
-      // Balls that touch at the points from inside, along the normals.
-      const auto ball = [&](const Shape& shape, const Support& at, double scale, const Vec3& along) {
-        const bool met = (at.normal - along).squaredNorm() <= kStationary * kStationary;
-        return met ? std::min(scale * rolling_radii(shape, at.where, at.normal).inner, pair.reach) : 0;
-      };
-      const double rho_a = ball(*pair.a, sa, pair.scale_a, d), rho_b = ball(*pair.b, sb, pair.scale_b, on_b);
-      const Vec3 core = (p.b - rho_b * (pair.turn * sb.normal)) - (p.a - rho_a * sa.normal);
-      const double slack = pair.scale_a * pair.a->joint_slack + pair.scale_b * pair.b->joint_slack;
-      c.bracket.direction = d;
-      c.bracket.lower = -upper;
-      c.bracket.upper =
-          core.dot(d) > 0 ? core.norm() - rho_a - rho_b + slack + kRoundoff * pair.reach : kFarAway;
-      c.bracket.unique = rho_a + rho_b;
-      c.iterations = s.iterations + k + 1;
-      c.normal = d;
-      c.gap = d.dot(p.b - p.a);
-      const Vec3 g = p.a - p.b, t = d.unitOrthogonal(), across = d.cross(t);
-      const Mat3 back = pair.turn.transpose();
-      Mat2 wa, wb;
-      if (!support_turn(*pair.a, p.on_a, d, d, t, across, pair.scale_a, &wa) ||
-          !support_turn(*pair.b, p.on_b, on_b, on_b, back * t, back * across, pair.scale_b, &wb))
-        return false;
-      const Mat2 hessian = wa + wb - d.dot(g) * Mat2::Identity();
-      const double det = hessian.determinant();
-      if (!(hessian(0, 0) > 0 && det > kSingular * hessian(0, 0) * hessian(1, 1))) return false;
-      const Vec2 step = -hessian.inverse() * Vec2(t.dot(g), across.dot(g));
-      if (c.bracket.width() <= tolerance && step.norm() <= settings_.tolerance) {
-        c.converged = true;
-        c.gap = std::clamp(c.gap, c.bracket.lower, c.bracket.upper);
-        p.na = d;
-        p.nb = -d;
-        s = c;
-        return true;
-      }
-      if (!(step.norm() <= kNormalTrust)) return false;
-      d = (d + step[0] * t + step[1] * across).normalized();
-    }
-    return false;
+    const Vec3 d = pair.axes_a.transpose() * load(memory_.proof.direction);
+    return meet_bridge(pair, d, tolerance, settings_.tolerance, s) ||
+           meet_crease(pair, d, tolerance, settings_.tolerance, s);
   }
 
   // A minimum of p that may not be the only one, whatever certificate: the polytope finds the others.
@@ -343,8 +286,23 @@ class Ladder {
     const ModelSide a{*pair.a, pair.scale_a, s.base_a, s.jet_a, Mat3::Identity(), Vec3::Zero(), turned2_a};
     const ModelSide b{*pair.b,     pair.scale_b, s.base_b, s.jet_b, pair.turn.transpose(),
                       pair.offset, turned2_b};
-    make_local_model(a, b, s.gap, 0.5 * s.bracket.unique, s.turn, settings_.tolerance, pair.size,
-                     &memory_.model);
+    if (!is_worth_a_model(a, b, s.gap, settings_.tolerance, pair.size)) return;
+    const double turn = s.dented ? turn_to_rival(pair, s) : kNormalMargin;
+    make_local_model(a, b, 0.5 * s.bracket.unique, turn, &memory_.model);
+  }
+
+  // Turn of the normal, rad, until another support point of a body with dents may take over. Two supports
+  // differ by at most the diameter times the turn more than they did.
+  static double turn_to_rival(const PairFrame& pair, const JointSolution& s) {
+    const auto clear = [](const Shape& shape, const Vec3& d, const SurfacePoint& at) {
+      const Support own = confirm_support(shape, d, at);
+      Support rival;
+      return find_rival(shape, d, own, &rival) ? std::max(0.0, own.h - rival.h) / shape.bounding_radius
+                                               : std::numeric_limits<double>::infinity();
+    };
+    const double least = std::min(clear(*pair.a, s.normal, s.points.on_a),
+                                  clear(*pair.b, pair.direction_on_b(s.normal), s.points.on_b));
+    return std::min(0.25 * least, kNormalMargin);
   }
 
   const Particle &a_, &b_;

@@ -165,6 +165,7 @@ constexpr double kNearPole =
     1e-4;  // ratio of the tangents' lengths below which a plane's warm solve hands on
 constexpr int kWarmIterations = 4;      // 1 or 2 are usual
 constexpr int kFollowedIterations = 3;  // of pairs side by side; the ladder takes over
+constexpr int kBridgeIterations = 6;    // over a dent; 2 or 3 are usual
 constexpr int kPolishIterations = 12;   // from a cold start
 
 // --- ellipsoids in closed form

@@ -82,10 +82,11 @@ void ContactStages::follow_surfaces(ContactBlock& block, int first, Results& res
     const auto side = [](const Particle& p, const SurfacePoint& at, const JetLanes& jet, const double* q) {
       return ModelSide{*p.shape, p.scale, at, jet, Mat3::Identity(), Vec3::Zero(), turned2(p.q, q)};
     };
-    make_local_model(side(pa, pairs.base_a[l], pairs.jet_a[l], proof.q_a),
-                     side(pb, pairs.base_b[l], pairs.jet_b[l], proof.q_b), pairs.gap[l],
-                     0.5 * pairs.unique[l], pairs.dented[l] ? 0 : kNormalMargin, step_.settings.tolerance,
-                     pairs.size[l], &model);
+    const ModelSide side_a = side(pa, pairs.base_a[l], pairs.jet_a[l], proof.q_a),
+                    side_b = side(pb, pairs.base_b[l], pairs.jet_b[l], proof.q_b);
+    if (!pairs.dented[l] &&
+        is_worth_a_model(side_a, side_b, pairs.gap[l], step_.settings.tolerance, pairs.size[l]))
+      make_local_model(side_a, side_b, 0.5 * pairs.unique[l], kNormalMargin, &model);
     if (model.unique > 0)
       block.set(lane, 0, kLocalModelSize, &model);
     else

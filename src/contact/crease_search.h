@@ -1,0 +1,26 @@
+// Contacts where the surfaces have no common normal: on a crease, and on a bridge, where the convex hull
+// spans a dent or a closing joint from one support point to another.
+#pragma once
+
+#include "contact/joint_newton.h"
+#include "contact/pair_frame.h"
+
+namespace nurbs {
+
+// Newton on p(d) from `direction` (unit, pair frame) and the points s->points, its gradient the offset of the
+// supports across d, its Hessian W_A + W_B - p with what a crease leaves of W. The certificate is that of
+// certificate.h, with no ball in the body whose normal is not d. True: *s is converged, its bracket no wider
+// than `tolerance` (a length) and its normal right to `tilt` rad; else *s stays. Two hull supports a step.
+bool meet_crease(const PairFrame& pair, const Vec3& direction, double tolerance, double tilt,
+                 JointSolution* s);
+
+// The least of p(d) where one body has two supports, x_1 and x_2, one either side of a dent, and the other
+// body one: p is the larger of two smooth functions there, and the minimum is where they are equal and a mean
+// of their gradients vanishes, l g_1 + (1 - l) g_2 = 0; Newton on d and l (Nocedal & Wright, ch. 18). The
+// contact is then at x = l x_1 + (1 - l) x_2 on the hull. With n_1 = n_2 = d the balls of radii r_1, r_2 that
+// touch at x_1, x_2 from inside (body/rolling.h) touch the plane square to d, and their hull holds the ball
+// of radius min(r_1, r_2) that touches it at x: the certificate of certificate.h holds. As above; some 10 us.
+bool meet_bridge(const PairFrame& pair, const Vec3& direction, double tolerance, double tilt,
+                 JointSolution* s);
+
+}  // namespace nurbs
