@@ -3,8 +3,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 
 #include "nurbs/bernstein.h"
+#include "nurbs/lanes.h"
 #include "nurbs/tolerances.h"
 
 namespace nurbs {
@@ -21,6 +23,7 @@ struct Box {
   double f[kMost], w[kMost];
 
   int size() const { return (nu + 1) * (nv + 1); }
+  bool bicubic() const { return nu == 3 && nv == 3; }
   double weight(int k) const { return rational ? w[k] : 1.0; }
   void set_header(const Box& other) {
     nu = other.nu;
@@ -39,6 +42,48 @@ void copy(const Box& from, Box* to) {
   if (from.rational) std::copy_n(from.w, from.size(), to->w);
 }
 
+// --- the same for bicubic nets, the usual ones: a row of four coefficients in a register
+
+struct Rows {
+  Lane4 r[4];
+  NURBS_INLINE explicit Rows(const double* c) { std::memcpy(r, c, sizeof r); }
+  NURBS_INLINE Rows turned() const {
+    Rows t = *this;
+    transpose({r[0], r[1], r[2], r[3]}, t.r);
+    return t;
+  }
+  NURBS_INLINE void store(double* c) const { std::memcpy(c, r, sizeof r); }
+};
+NURBS_INLINE Lane4 lesser(const Lane4& a, const Lane4& b) {
+  return a < b ? a : b;
+}
+NURBS_INLINE Lane4 greater(const Lane4& a, const Lane4& b) {
+  return a > b ? a : b;
+}
+NURBS_INLINE double highest(const Lane4& a) {
+  return std::max(std::max(a[0], a[1]), std::max(a[2], a[3]));
+}
+
+// `low` into both halves.
+NURBS_INLINE void halve_bicubic(double* low, double* high, bool along_u) {
+  Rows c(low);
+  if (!along_u) c = c.turned();
+  const Lane4 a = 0.5 * (c.r[0] + c.r[1]), b = 0.5 * (c.r[1] + c.r[2]), d = 0.5 * (c.r[2] + c.r[3]);
+  const Lane4 ab = 0.5 * (a + b), bd = 0.5 * (b + d), middle = 0.5 * (ab + bd);
+  Rows first = c, second = c;
+  first.r[1] = a;
+  first.r[2] = ab;
+  first.r[3] = second.r[0] = middle;
+  second.r[1] = bd;
+  second.r[2] = d;
+  if (!along_u) {
+    first = first.turned();
+    second = second.turned();
+  }
+  first.store(low);
+  second.store(high);
+}
+
 void halve(const Box& box, bool along_u, Box* low, Box* high) {
   copy(box, low);
   high->set_header(box);
@@ -46,8 +91,14 @@ void halve(const Box& box, bool along_u, Box* low, Box* high) {
     low->u1 = high->u0 = 0.5 * (box.u0 + box.u1);
   else
     low->v1 = high->v0 = 0.5 * (box.v0 + box.v1);
-  halve_net(low->f, high->f, box.nu, box.nv, along_u);
-  if (box.rational) halve_net(low->w, high->w, box.nu, box.nv, along_u);
+  const auto both = [&](double* first, double* second) {
+    if (box.bicubic())
+      halve_bicubic(first, second, along_u);
+    else
+      halve_net(first, second, box.nu, box.nv, along_u);
+  };
+  both(low->f, high->f);
+  if (box.rational) both(low->w, high->w);
 }
 
 // Keeps one edge of the box: `high` u (or v) only.
@@ -103,6 +154,23 @@ Taylor evaluate_net(const double* c, int nu, int nv, double s, double t) {
   return {a[0], a[1], b[0], a[2], b[1], d[0]};
 }
 
+Taylor evaluate_bicubic(const double* c, double s, double t) {
+  const Rows x(c);
+  const double r = 1 - s, q = 1 - t;
+  const Lane4 a = r * x.r[0] + s * x.r[1], b = r * x.r[1] + s * x.r[2], d = r * x.r[2] + s * x.r[3];
+  const Lane4 ab = r * a + s * b, bd = r * b + s * d;
+  const Lane4 f = r * ab + s * bd, fu = 3.0 * (bd - ab), fuu = 6.0 * (d - 2.0 * b + a);
+  const Lane4 value{q * q * q, 3 * q * q * t, 3 * q * t * t, t * t * t},
+      slope{-3 * q * q, 3 * q * (q - 2 * t), 3 * t * (2 * q - t), 3 * t * t},
+      bend{6 * q, 6 * (t - 2 * q), 6 * (q - 2 * t), 6 * t};
+  Lane4 first[4], second[4];
+  transpose({f * value, fu * value, f * slope, fuu * value}, first);
+  transpose({fu * slope, f * bend, f, f}, second);
+  const Lane4 one = first[0] + first[1] + first[2] + first[3],
+              two = second[0] + second[1] + second[2] + second[3];
+  return {one[0], one[1], one[2], one[3], two[0], two[1]};
+}
+
 struct Range {
   double low = kFarAway, high = -kFarAway;
   void add(double x) {
@@ -127,6 +195,46 @@ void difference(const double* g, int nu, int nv, Bounds* b) {
       if (i + 1 < nu) b->guu.add(c[2 * row] - 2 * c[row] + c[0]);
       if (j + 1 < nv) b->gvv.add(c[2] - 2 * c[1] + c[0]);
     }
+}
+
+void difference_bicubic(const double* g, Bounds* b) {
+  const Rows c(g);
+  // Neighbours in a row; the last counts twice.
+  const auto step = [](const Lane4& r) {
+    const Lane4 d = __builtin_shufflevector(r, r, 1, 2, 3, 3) - __builtin_shufflevector(r, r, 0, 1, 2, 2);
+    return d;
+  };
+  const Lane4 u[3] = {c.r[1] - c.r[0], c.r[2] - c.r[1], c.r[3] - c.r[2]};
+  const Lane4 v[4] = {step(c.r[0]), step(c.r[1]), step(c.r[2]), step(c.r[3])};
+  const Lane4 uu[2] = {u[1] - u[0], u[2] - u[1]};
+  Lane4 vv[4];
+  for (int i = 0; i < 4; ++i) {
+    const Lane4 after = __builtin_shufflevector(v[i], v[i], 1, 2, 2, 2),
+                before = __builtin_shufflevector(v[i], v[i], 0, 1, 1, 1);
+    vv[i] = after - before;
+  }
+  const Lane4 mixed[3] = {v[1] - v[0], v[2] - v[1], v[3] - v[2]};
+  const auto least = [](const Lane4& p, const Lane4& q, const Lane4& r, const Lane4& s) {
+    return lesser(lesser(p, q), lesser(r, s));
+  };
+  const auto most = [](const Lane4& p, const Lane4& q, const Lane4& r, const Lane4& s) {
+    return greater(greater(p, q), greater(r, s));
+  };
+  Lane4 low[4], high[4];
+  transpose({least(u[0], u[1], u[2], u[2]), least(v[0], v[1], v[2], v[3]), lesser(uu[0], uu[1]),
+             least(vv[0], vv[1], vv[2], vv[3])},
+            low);
+  transpose({most(u[0], u[1], u[2], u[2]), most(v[0], v[1], v[2], v[3]), greater(uu[0], uu[1]),
+             most(vv[0], vv[1], vv[2], vv[3])},
+            high);
+  const Lane4 lows = least(low[0], low[1], low[2], low[3]), highs = most(high[0], high[1], high[2], high[3]);
+  b->gu = {lows[0], highs[0]};
+  b->gv = {lows[1], highs[1]};
+  b->guu = {lows[2], highs[2]};
+  b->gvv = {lows[3], highs[3]};
+  const Lane4 zero{0, 0, 0, 0};
+  b->guv = {-highest(greater(zero - mixed[0], greater(zero - mixed[1], zero - mixed[2]))),
+            highest(greater(mixed[0], greater(mixed[1], mixed[2])))};
 }
 
 class Search {
@@ -203,6 +311,13 @@ class Search {
   // Coefficients of f - level w; whether any is positive.
   bool lower(const Box& box, double* g) {
     const double level = level_ = best_->h - h0_ + slack_;
+    if (box.bicubic()) {
+      Rows c(box.f);
+      const Rows w(box.rational ? box.w : box.f);
+      for (int i = 0; i < 4; ++i) c.r[i] -= box.rational ? Lane4(level * w.r[i]) : Lane4{} + level;
+      c.store(g);
+      return highest(greater(greater(c.r[0], c.r[1]), greater(c.r[2], c.r[3]))) > 0;
+    }
     double most = -kFarAway;
     const int n = box.size();
     if (box.rational)
@@ -224,7 +339,10 @@ class Search {
       if (box.nu == 0 && box.nv == 0) return Next::done;
       if (best_->h > before && !lower(box, g)) return Next::done;
       Bounds b;
-      difference(g, box.nu, box.nv, &b);
+      if (box.bicubic())
+        difference_bicubic(g, &b);
+      else
+        difference(g, box.nu, box.nv, &b);
       const bool one_u = box.nu > 0 && (b.gu.high <= 0 || b.gu.low >= 0);
       const bool one_v = box.nv > 0 && (b.gv.high <= 0 || b.gv.low >= 0);
       if (one_u || one_v) {
@@ -265,7 +383,7 @@ class Search {
       if (v) t = (at.v - box.v0) / width_v;
     }
     for (int k = 0;; ++k) {
-      const Taylor x = evaluate_net(g, box.nu, box.nv, s, t);
+      const Taylor x = box.bicubic() ? evaluate_bicubic(g, s, t) : evaluate_net(g, box.nu, box.nv, s, t);
       // What the bounds hold back is no slope.
       const bool at_u = !u || (s <= 0 && x.fu < 0) || (s >= 1 && x.fu > 0);
       const bool at_v = !v || (t <= 0 && x.fv < 0) || (t >= 1 && x.fv > 0);

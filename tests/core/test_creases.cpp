@@ -11,6 +11,7 @@
 #include "contact/polytope.h"
 #include "nurbs/tolerances.h"
 #include "support/bodies.h"
+#include "support/pairs.h"
 #include "support/random.h"
 
 namespace nurbs {
@@ -105,6 +106,41 @@ TEST(Creases, warm_contacts_need_no_polytope_and_agree_with_it) {
     }
   EXPECT_EQ(creases, 160);
   EXPECT_LE(dear, 8);
+}
+
+// Contacts that bridge a dent from one support point to another, with bodies that turn: solved from nothing
+// they take the polytope, which agrees; followed they don't.
+TEST(Creases, contacts_over_dents_are_followed) {
+  const ShapePointer body = make_shape("blocky", fitted_superellipsoid({1, 0.9, 0.8}, 4, 3));
+  ASSERT_TRUE(body->dented());
+  Random random(11);
+  ContactSettings settings;
+  settings.reach = 0;
+  int polytopes = 0, followed = 0;
+  for (int k = 0; k < 100; ++k) {
+    const auto path =
+        tumble(random, random_pair_at(random, *body, -std::pow(10.0, random.uniform(-4, -2))), 2e-3, 12);
+    double memory[kPairMemorySize] = {};
+    for (std::size_t i = 0; i < path.size(); ++i) {
+      const ContactResult r = find_contact(path[i].a, path[i].b, settings, memory);
+      if (i < 2) continue;
+      double nothing[kPairMemorySize] = {};
+      const ContactResult cold = find_contact(path[i].a, path[i].b, settings, nothing);
+      ASSERT_EQ(r.status, Status::converged);
+      ASSERT_EQ(cold.status, Status::converged);
+      const double size = std::min(path[i].a.scale, path[i].b.scale) * body->bounding_radius;
+      EXPECT_NEAR(r.gap, cold.gap, 2 * settings.tolerance * size);
+      EXPECT_LE(r.lower, r.gap);
+      EXPECT_LE(r.gap, r.upper);
+      EXPECT_LE(-overlap_along(path[i].a, path[i].b, r.normal), r.gap + settings.tolerance * size);
+      EXPECT_GE(-overlap_along(path[i].a, path[i].b, r.normal), r.gap - settings.tolerance * size);
+      if (cold.rung != Rung::fallback) continue;
+      ++polytopes;
+      followed += r.rung == Rung::warm;
+    }
+  }
+  EXPECT_GE(polytopes, 8);
+  EXPECT_GE(followed, 0.8 * polytopes);
 }
 
 }  // namespace
