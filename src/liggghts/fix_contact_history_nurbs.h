@@ -43,6 +43,10 @@ class FixContactHistoryNurbs : public FixContactHistory {
   // A pair style asks every fix, first thing when it begins: the host's would stop at this one.
   int n_history_extra() override;
 
+  // The host wants type 1 in use, which it need not be where particles come later or are gone.
+  int min_type() override { return 1; }
+  int max_type() override { return 1; }
+
   // What owned particle i remembered of the particle `tag` when the neighbour lists were last made; the host
   // forgets it where the bounding spheres are apart. Nothing when it remembered nothing.
   void recall(int i, int tag, nurbs::PairProof* to) const;

@@ -197,6 +197,12 @@ void PairGranNurbs::init_style() {
   warn_time_step();
 }
 
+// Where there are no particles yet, or no more, the host would stop: "Atom sorting has bin size = 0.0".
+double PairGranNurbs::init_one(int i, int j) {
+  const double reach = PairGran::init_one(i, j);
+  return reach > 0 ? reach : neighbor->skin;
+}
+
 // Across a short periodic edge two particles, or one and its image, can touch twice: each is a contact of its
 // own. What is remembered goes by the partner's number alone; of several it is that of this image, not what
 // the host may have found first.

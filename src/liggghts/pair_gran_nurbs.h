@@ -37,6 +37,7 @@ class PairGranNurbs : public PairGran {
   void settings(int narg, char** arg) override;
   void coeff(int narg, char** arg) override;
   void init_style() override;
+  double init_one(int i, int j) override;
   void init_granular() override;
   void reset_dt() override;
 

@@ -82,6 +82,11 @@ void SetNurbs::command(int narg, char** arg) {
     if (std::strncmp(arg[k], "nurbs/", 6) == 0 && setter.length(arg[k]) == 0)
       fail_all(FLERR, lmp,
                std::string("Set: unknown keyword ") + arg[k] + "; NURBS particles have " + setter.words());
+    for (const char* word :
+         {"shape", "scale", "quaternion", "orientation"})  // the host's shape is that of ellipsoids
+      if (std::strcmp(arg[k], word) == 0)
+        fail_all(FLERR, lmp,
+                 std::string("Set: ") + arg[k] + " can't be set; NURBS particles have " + setter.words());
     if (std::strncmp(arg[k], "property/atom", 13) == 0) break;  // all that follows is its
     const int length = setter.length(arg[k]);
     if (length == 0) {

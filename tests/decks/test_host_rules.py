@@ -140,6 +140,27 @@ class Set(unittest.TestCase):
         self.check_sizes(frame)
 
 
+class NoParticles(unittest.TestCase):
+    """A box may be run before anything is in it, and when all is gone."""
+    LINEAR = "pair_style gran/nurbs\npair_coeff * * kn 1e6 kt 5e5 mu 0.4\n"
+    BOX = ("units si\nnewton off\ncommunicate single vel yes\natom_style nurbs box.json cube.json\nboundary p p f\n"
+           "region b block -6 6 -6 6 0 12 units box\ncreate_box 2 b\nneighbor 0.3 bin\nneigh_modify delay 0\n{law}"
+           "fix motion all nve/nurbs\ntimestep 1e-3\nfix gravity all gravity 10 vector 0 0 -1\nthermo_style custom step atoms ke\n"
+           "thermo_modify lost ignore norm no\nrun 10\ncreate_atoms 2 single 0 0 6 units box\nset group all density 8\n"
+           "run 100\ndelete_atoms group all\nrun 10\ncreate_atoms 2 single 0 0 6 units box\nset group all density 8\n"
+           "run 2000\nrun 10\n")
+
+    def test_before_and_after(self):
+        for law in (self.LINEAR, HERTZ[0].replace("peratomtype 5e6", "peratomtype 5e6 5e6").replace(
+                "peratomtype 0.3", "peratomtype 0.3 0.3").replace("peratomtypepair 1 0.5", "peratomtypepair 2 .5 .5 .5 .5").replace(
+                "peratomtypepair 1 0.4", "peratomtypepair 2 .4 .4 .4 .4") + "\n"):
+            for ranks in (1, 2):
+                run = deck.run_ok(self.BOX.format(law=law), ranks=ranks, files=SHAPES)
+                self.assertEqual([table["Atoms"][-1] for table in run.tables], [0, 1, 0, 0, 0])
+                mass = 8 * 8 * AXES.prod()
+                self.assertAlmostEqual(run.tables[1]["KinEng"][-1] / (0.5 * mass), 1, delta=1e-3)
+
+
 class OtherCommands(unittest.TestCase):
     def test_displace_atoms_rotate_turns(self):
         for ranks in (1, 2):
@@ -328,7 +349,9 @@ class Refused(unittest.TestCase):
         for command, *expected in (
                 ("set group all nurbs/shape ball", "shape ball", "box cube"), ("set group all nurbs/scale 0", "nurbs/scale = 0", "> 0"),
                 ("set group all nurbs/scale", "nurbs/scale needs 1 value"), ("set group all nurbs/size 1", "nurbs/size", "nurbs/scale"),
-                ("set group all density -1", "density = -1", "> 0"), ("set group none density 1", "no group none"),
+                ("set group all density -1", "density = -1", "> 0"),
+                ("set group all vx 1 shape ball", "shape can't be set", "nurbs/shape nurbs/scale quat"),
+                ("set group all scale 2", "scale can't be set", "nurbs/scale"), ("set group none density 1", "no group none"),
                 ("set atom 1 quat 0 0 0 10", "axis 0 0 0"), ("set group all quat 1 0 0", "quat needs 4 values"),
                 ("set group all nurbs/scale v_x", "no variable x"), ("set all all density 1", "all must be one of"),
                 ("variable x atom id-2\nset group all nurbs/scale v_x", "v_x must be a number > 0"),
