@@ -16,7 +16,8 @@ namespace {
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr double kSamePose =
     1e-6;  // of the smaller radius: bodies that a new run finds nearer were not moved
-constexpr double kBudgetShare = 1 - 1e-12;  // of a proven gap: sums of paths are rounded
+constexpr double kStepsToMeet = 2, kStepsToPart = 4;  // see stays_near
+constexpr double kBudgetShare = 1 - 1e-12;            // of a proven gap: sums of paths are rounded
 
 NURBS_INLINE BodyMotionOf<Wide> gather_motion(const double* const (&record)[kWidth]) {
   Wide f[16];
@@ -215,6 +216,16 @@ double ContactStages::proven(int k) const {
   return std::max(spheres, proven_gap(proof, apart, first.q, ra, body.q, rb.radius, 0));
 }
 
+// Whether a pair proven `lower` apart may meet within so many steps of bodies that move on as they do: it is
+// then cheaper to follow as a contact than to look at again and again.
+bool ContactStages::stays_near(int a, int b, double lower, double steps) const {
+  if (a < 0) return false;
+  const auto way = [this](const BodyRecord& r) {
+    return load(r.velocity).norm() + r.radius * load(r.spin).norm();
+  };
+  return lower < steps * step_.dt * (way(record(a)) + way(record(b)));
+}
+
 // A neighbour whose budget is used up: proven apart anew, or solved.
 void ContactStages::look(int k) {
   const int a = a_[k], b = b_[k];
@@ -241,11 +252,12 @@ void ContactStages::look(int k) {
   if (r.rung == Rung::none && !touches(r)) return;  // poses that are no numbers
   const bool apart = r.lower > 0 || r.status == Status::separated;
   if (step_.setup && apart) return;
+  const bool released = apart && !stays_near(a, b, r.lower, kStepsToMeet);
   proof = memory.proof;
   proof.on_a = coarse(memory.on_a);
   proof.on_b = coarse(memory.on_b);
   proof.contact = 0;
-  if (apart) {
+  if (released) {
     if (has_proof(proof)) expiry_[k] = expiry(k, r.lower);
     return;
   }
@@ -488,7 +500,7 @@ void ContactStages::compute_block(ContactBlock& block) {
       continue;
     }
     close(block, lane);
-    if (!(results.lower[lane] > 0)) continue;
+    if (!(results.lower[lane] > 0) || stays_near(a, b, results.lower[lane], kStepsToPart)) continue;
     if (served) {
       PairProof& proof = *block.proof[lane];
       const Vec3 apart = a < 0 ? Vec3(step_.wall_normal.dot(offset(a, b)) * step_.wall_normal) : offset(a, b);

@@ -206,6 +206,7 @@ class ContactStages {
   void check_stamps();
   void check_budgets();
   double proven(int k) const;
+  bool stays_near(int a, int b, double lower, double steps) const;
   void look(int k);
   ContactResult search(int a, int b, PairMemory& memory);
   void count(const ContactResult& result, int a, int b);

@@ -1,6 +1,6 @@
 // Stage (d) for contacts that go on: Newton on the surfaces, side by side (contact/joint_lanes.h). What is
 // not found here is solved one at a time.
-#include <algorithm>
+#include <limits>
 
 #include "contact/joint_lanes.h"
 #include "scene/block_lanes.h"
@@ -53,7 +53,7 @@ void ContactStages::follow_surfaces(ContactBlock& block, int first, Results& res
   pairs.size = smaller(a.radius, b.radius);
   pairs.reach = larger(a.radius, b.radius);
   pairs.tolerance = larger<Wide>(step_.settings.tolerance * pairs.size, kLeastTolerance * pairs.reach);
-  const unsigned found = follow_joints(asked, step_.settings.reach, &pairs);
+  const unsigned found = follow_joints(asked, std::numeric_limits<double>::infinity(), &pairs);
   if (found == 0) return;
 
   WideMask mask;
@@ -64,7 +64,7 @@ void ContactStages::follow_surfaces(ContactBlock& block, int first, Results& res
   put_lanes(mask, pairs.normal, first, results.normal);
   put_lanes(mask, all<Wide>(0.5) * (pairs.point_a + pairs.point_b), first, results.point);
   put_lanes(mask, pairs.offset, first, results.offset);
-  put_lanes(mask, select(pairs.gap < 0.0, one, Wide{}), first, results.touching);
+  put_lanes(mask, select((pairs.gap < 0.0) & (pairs.lower <= 0.0), one, Wide{}), first, results.touching);
   put_lanes(mask, one, first, results.served);
   for (int l = 0; l < kWidth; ++l)
     if (found >> l & 1) results.iterations[first + l] = pairs.iterations[l];
