@@ -134,10 +134,19 @@ double bound_projected_gap(const BezierPatch& a, int edge, const BezierPatch& b,
   return gap;
 }
 
+// Positions as seen from the first one of an edge, so that small patches far from the origin cancel little.
+void count_from(const Vec4& first, Homogeneous* points) {
+  const Vec3 origin = first.head<3>() / first[3];
+  for (Vec4& p : *points) p.head<3>() -= p[3] * origin;
+}
+
 // Normal along an edge, outward, any length: w^3 (x_u cross x_v) of the homogeneous (X, w), by which it is
 // w (X_u cross X_v) - w_v X_u cross X - w_u X cross X_v.
 Vectors normal_along(const BezierPatch& patch, int edge) {
-  const Homogeneous here = row(patch, edge, 0), next = row(patch, edge, 1);
+  Homogeneous here = row(patch, edge, 0), next = row(patch, edge, 1);
+  const Vec4 first = here.front();
+  count_from(first, &here);
+  count_from(first, &next);
   const double n = edge < 2 ? patch.degree_u : patch.degree_v;
   Homogeneous across_edge = difference(next, here);
   for (Vec4& p : across_edge) p *= edge % 2 ? -n : n;
@@ -245,7 +254,9 @@ KinkBounds bound_kink(const BezierPatch& a, int edge, const BezierPatch& b, cons
   remove_end_roots(&m.b);
   count_as(link, &m.b);
   // The tangent, any length, with a's surface on its left: w X' - X w'.
-  const Homogeneous here = row(a, edge, 0), along = derivative(here);
+  Homogeneous here = row(a, edge, 0);
+  count_from(Vec4(here.front()), &here);
+  const Homogeneous along = derivative(here);
   m.along = difference(multiply(positions(along), weights(here), kScale),
                        multiply(positions(here), weights(along), kScale));
   if (edge == 0 || edge == 3)

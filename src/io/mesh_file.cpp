@@ -162,9 +162,13 @@ TriangleMesh read_ascii_stl(const std::string& file, const std::string& raw) {
 TriangleMesh read_stl(const std::string& file, const std::string& text) {
   const bool sized =
       text.size() >= 84 && text.size() == 84 + 50 * static_cast<size_t>(little_endian(&text[80]));
-  const size_t mark = text.compare(0, 3, "\xEF\xBB\xBF") == 0 ? 3 : 0;
-  if (!sized && lower(text.substr(mark, 5)) == "solid" && text.find('\0') == std::string::npos)
-    return read_ascii_stl(file, text);
+  if (!sized && text.find('\0') == std::string::npos) {
+    const size_t mark = text.compare(0, 3, "\xEF\xBB\xBF") == 0 ? 3 : 0;
+    const size_t start = text.find_first_not_of(" \t\r\n", mark);
+    if (start != std::string::npos && lower(text.substr(start, 5)) == "solid")
+      return read_ascii_stl(file, text);
+    fail(file, "is no STL file: it begins neither with 'solid' nor as a binary one");
+  }
   return read_binary_stl(file, text);
 }
 
@@ -252,11 +256,10 @@ class PlyReader {
   void read_header() {
     std::string format;
     for (bool first = true;; first = false) {
-      const size_t end = text_.find('\n', at_);
+      const size_t end = text_.find_first_of("\r\n", at_);
       if (end == std::string::npos) fail(file_, "the PLY header does not end");
-      std::string row = text_.substr(at_, end - at_);
-      at_ = end + 1;
-      if (!row.empty() && row.back() == '\r') row.pop_back();
+      const std::string row = text_.substr(at_, end - at_);
+      at_ = end + (text_.compare(end, 2, "\r\n") == 0 ? 2 : 1);
       std::istringstream words(row);
       std::string word;
       words >> word;
@@ -278,10 +281,28 @@ class PlyReader {
         elements_.back().properties.push_back(p);
       }
     }
+    check_elements();
     ascii_ = format == "ascii";
     swap_ = format == "binary_big_endian";
     if (!ascii_ && !swap_ && format != "binary_little_endian")
       fail(file_, "PLY format '" + format + "' is not known");
+  }
+
+  void check_elements() const {
+    int coordinates = 0;
+    bool corners = false;
+    for (const Element& e : elements_)
+      for (const Property& p : e.properties) {
+        coordinates += e.name == "vertex" && p.count_type.empty() && is_coordinate(p);
+        corners = corners || (e.name == "face" && names_corners(p));
+      }
+    if (coordinates != 3) fail(file_, "the PLY vertices have no x, y and z");
+    if (!corners) fail(file_, "the PLY file has no faces with a list vertex_indices");
+  }
+
+  static bool is_coordinate(const Property& p) { return p.name == "x" || p.name == "y" || p.name == "z"; }
+  static bool names_corners(const Property& p) {
+    return !p.count_type.empty() && (p.name == "vertex_indices" || p.name == "vertex_index");
   }
 
   double value(const std::string& type) {
@@ -317,12 +338,12 @@ class PlyReader {
     for (const Property& p : e.properties) {
       if (p.count_type.empty()) {
         const double x = value(p.type);
-        if (p.name.size() == 1 && p.name[0] >= 'x' && p.name[0] <= 'z') point[p.name[0] - 'x'] = x;
+        if (is_coordinate(p)) point[p.name[0] - 'x'] = x;
         continue;
       }
       const double count = value(p.count_type);
       if (!(count >= 0 && count <= 1e6)) fail(file_, "a PLY list of impossible length");
-      const bool is_face = p.name == "vertex_indices" || p.name == "vertex_index";
+      const bool is_face = names_corners(p);
       for (int k = 0; k < static_cast<int>(count); ++k) {
         const double index = value(p.type);
         if (is_face) corners.push_back(index >= 0 && index < 2e9 ? static_cast<int>(index) : -1);

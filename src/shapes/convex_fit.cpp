@@ -493,23 +493,12 @@ class Fitter {
   double fairing_ = kFirstFairing, damping_ = kFirstDamping;
 };
 
-// Removes what round-off left of the conditions: the shortest correction, twice.
-void tidy(const SmoothCube& cube, NetPoints& points) {
-  const Sparse& c = cube.conditions();
-  Sparse normal = c * Sparse(c.transpose());
-  Sparse regular(normal.rows(), normal.rows());
-  regular.setIdentity();
-  const Eigen::SimplicialLDLT<Sparse> solver(Sparse(normal + 1e-11 * regular));
-  for (int pass = 0; pass < 4; ++pass)
-    points -= c.transpose() * Eigen::MatrixXd(solver.solve(Eigen::MatrixXd(c * points)));
-}
-
 }  // namespace
 
 ConvexFit fit_convex(const SmoothCube& cube, const NetPoints& start, const OffsetTarget& target,
                      const ConvexFitOptions& options) {
   ConvexFit fit = Fitter(cube, target, options).run(start);
-  tidy(cube, fit.points);
+  fit.points = cube.tidied(fit.points);
   return fit;
 }
 
@@ -557,7 +546,7 @@ NetPoints fit_points(const SmoothCube& cube, const NetTarget& target) {
   matrix.setFromTriplets(entries.begin(), entries.end());
   const Eigen::SimplicialLDLT<Sparse, Eigen::Lower> solver(matrix);
   NetPoints points = Eigen::MatrixXd(solver.solve(right)).topRows(count);
-  tidy(cube, points);
+  points = cube.tidied(points);
   return points;
 }
 

@@ -114,6 +114,17 @@ Vec3 nearest_on_simplex(Vec3 (&y)[4], int& count) {
   return nearest;
 }
 
+std::vector<Vec3> polar_points(const ConvexHull& hull) {
+  std::vector<Vec3> out;
+  const auto& p = hull.mesh().points;
+  for (const auto& t : hull.mesh().triangles) {
+    const Vec3 n = (p[t[1]] - p[t[0]]).cross(p[t[2]] - p[t[0]]);
+    const double h = n.dot(p[t[0]]);
+    if (h > 1e-9 * n.norm()) out.emplace_back(n / h);
+  }
+  return out;
+}
+
 ConvexHull::ConvexHull(const std::vector<Vec3>& points) {
   if (is_flat(points)) throw ShapeError("the points lie in a plane: their convex hull has no inside");
   TriangleMesh all{points, hull_triangles(points)};

@@ -12,6 +12,12 @@ namespace nurbs {
 // Nearest point to the origin of the simplex with `count` corners y; leaves in y those that it is a mean of.
 Vec3 nearest_on_simplex(Vec3 (&y)[4], int& count);
 
+class ConvexHull;
+
+// n / h of the facets, n outward unit normals, h > 0 distances from the origin inside: the polar hull's
+// vertices, whose support is the hull's gauge function.
+std::vector<Vec3> polar_points(const ConvexHull& hull);
+
 class ConvexHull {
  public:
   // Of finite points. Throws ShapeError when they lie in a plane, to within 1e-9 of their extent.

@@ -13,6 +13,7 @@
 #include "nurbs/affine.h"
 #include "nurbs/bernstein.h"
 #include "shapes/convex_fit.h"
+#include "shapes/gauge_fit.h"
 #include "shapes/primitives.h"
 #include "shapes/revolved.h"
 #include "shapes/rounded_polyhedron.h"
@@ -20,28 +21,41 @@
 namespace nurbs {
 namespace {
 
-// Degree and spans of the bodies tried, by number of control points.
-constexpr int kLadder[][2] = {{3, 1}, {4, 1}, {3, 2}, {4, 2}, {3, 3}, {4, 3},
-                              {3, 4}, {4, 4}, {3, 6}, {4, 6}, {3, 8}};
-constexpr int kMostSpans = 8, kHopefulSpans = 3;
-constexpr double kSteepest = 2.5;      // power of the spans by which an error falls, at the most
+// Degree and spans of the bodies tried, by number of control points: polynomial ones, then by gauge
+// functions.
+constexpr int kLadder[][2] = {{3, 1}, {4, 1}, {3, 2}, {4, 2}, {3, 3}, {4, 3}, {3, 4}};
+constexpr int kGaugeLadder[][2] = {{4, 4}, {4, 6}, {4, 8}, {4, 10}, {4, 12}};
+constexpr int kCostlySpans = 4;  // polynomial fits take 10 s from here on ...
+constexpr double kNear = 1.5;    // ... and need a last error of less than this times the tolerance
+constexpr double kFine = 4;      // times the tolerance is the first error where many points are expected
+constexpr double kPolynomialGain =
+    1.6;                         // error of the first gauge function over polynomial ones', at the most
+constexpr int kMostDents = 2;    // polynomial bodies near enough but dented: no more are tried then
+constexpr double kSteepest = 3;  // power of the spans by which an error falls, at the most, and with edges:
+constexpr double kGaugeSteepest = 2;   // .. of hulls for which polynomial patches were too few
+constexpr double kRaised = 2;          // largest gain of a degree: rungs that need more of it are skipped
 constexpr double kCurvatureShare = 3;  // least curvature over the tolerance, both relative
 constexpr double kLeastCurvature = 0.002, kMostCurvature = 0.1;
+constexpr double kGaugeCurvatures[] = {10, 3, 1};  // over the tolerance: the first that can be had
+constexpr double kGaugeGain = 1.4;                 // largest fall of the error by asking for less curvature
 constexpr int kFurther = 2;  // rungs tried beyond a body that is near enough, but not proven convex
-constexpr double kSurelyTooCoarse = 3;  // times the tolerance: the next rung is skipped
+constexpr double kSurelyTooCoarse = 3;  // times the tolerance: no freer fit is tried
 // A fit that aims at far less than it can reach weighs distances so heavily that it loses convexity: the aim
 // falls from kFirstAim (of the radius) with what has been reached.
 constexpr double kFirstAim = 0.06, kAimShare = 0.6;
+constexpr double kAim = 0.97, kOutwardAim = 0.93;  // of a tolerance, left to samples
 // Distance from its ray that costs a point as much as an error of the tolerance: free too early, the points
 // crowd.
 constexpr double kFirstSlide = 0.05, kFreeSlide = 0.15;
 constexpr size_t kMostFaces = 60;  // of a polyhedron with rounded edges ...
 constexpr int kRoundings = 2;      // ... whose radius is found by the distance of the first one
+constexpr int kHalvings = 12;      // ... and that is halved where it fits nowhere
 constexpr int kRimPoints = 96;     // of a circle, at which its distance from the hull is looked at
 constexpr double kRimCut = 0.7,
                  kChordCut = 0.25;    // of the tolerance: what corners and a coarser profile take
 constexpr size_t kMostProfile = 400;  // corners of the hull's own profile ...
 constexpr size_t kMostCorners = 12;   // ... and of the coarser one: rounder bodies are for splines
+constexpr double kThin = 2;
 constexpr int kClosestSteps = 40;
 constexpr double kClosestStride = 0.3;  // parameters
 constexpr int kMostPieces = 200000;
@@ -142,17 +156,21 @@ double outward_distance(const Shape& shape, const ConvexHull& hull, double resol
 
 // --- fits
 
-// The map that makes the hull's moments those of a unit ball, about its centre of mass.
+// The map that makes the hull's moments those of a unit ball, about its centre of mass; and the metric of
+// distances (ConvexFitOptions), by which those along an axis of less than kThin tolerances count the more.
 struct Frame {
   Vec3 center;
-  Mat3 to, from;
+  Mat3 to, from, metric;
 };
 
-Frame even_frame(const MassProperties& mass) {
+Frame even_frame(const MassProperties& mass, double tolerance) {
   const Mat3 gyration = mass.inertia / mass.volume;
   const Mat3 covariance = 0.5 * gyration.trace() * Mat3::Identity() - gyration;
   const Eigen::SelfAdjointEigenSolver<Mat3> axes(5 * covariance);
-  return {mass.center, axes.operatorInverseSqrt(), axes.operatorSqrt()};
+  const Vec3 lengths = axes.eigenvalues().cwiseSqrt().cwiseMax(kThin * tolerance);
+  const Mat3 metric =
+      axes.eigenvectors() * lengths.cwiseInverse().asDiagonal() * axes.eigenvectors().transpose();
+  return {mass.center, axes.operatorInverseSqrt(), axes.operatorSqrt(), metric};
 }
 
 double bounding_radius(const ConvexHull& hull, const Vec3& center) {
@@ -175,17 +193,6 @@ class RayTarget {
   }
 
  private:
-  static std::vector<Vec3> polar_points(const ConvexHull& hull) {
-    std::vector<Vec3> out;
-    const auto& p = hull.mesh().points;
-    for (const auto& t : hull.mesh().triangles) {
-      const Vec3 n = (p[t[1]] - p[t[0]]).cross(p[t[2]] - p[t[0]]);
-      const double h = n.dot(p[t[0]]);
-      if (h > 1e-9 * n.norm()) out.emplace_back(n / h);
-    }
-    return out;
-  }
-
   ConvexHull polar_;
 };
 
@@ -295,9 +302,10 @@ std::string percent(double x) {
 class HullFitter {
  public:
   HullFitter(const ConvexHull& hull, const HullFitOptions& options)
-      : hull_(hull), options_(options), mass_(hull.properties()), frame_(even_frame(mass_)) {
+      : hull_(hull), options_(options), mass_(hull.properties()) {
     radius_ = bounding_radius(hull, mass_.center);
     tolerance_ = options.tolerance * radius_;
+    frame_ = even_frame(mass_, tolerance_);
   }
 
   HullFit run() {
@@ -305,14 +313,26 @@ class HullFitter {
     std::vector<Vec3> even;
     for (const Vec3& p : hull_.mesh().points) even.emplace_back(frame_.to * (p - frame_.center));
     const RayTarget target{ConvexHull(even)};
+    const bool any = options_.spans == 0;
+    const ConvexHull even_hull(even);
     int further = 0;
     for (const auto& [degree, spans] : kLadder) {
-      if (options_.spans > 0 && spans != options_.spans) continue;
-      if (spans > 1 && options_.spans == 0 && (try_revolution() || try_polyhedron())) return best_;
-      if (degree == 4 && start_error_ < kFar && start_error_ > kSurelyTooCoarse * tolerance_) continue;
+      if ((!any && spans != options_.spans) || too_many(degree, spans)) continue;
+      if (spans > 1 && any && (try_revolution() || try_polyhedron())) return best_;
+      if (any && too_coarse(degree, spans)) continue;
+      if (any && spans > 1 && dents_ == kMostDents) break;
+      if (any && spans > 1 && start_error_ > kFine * tolerance_ && !polynomials_may_do(even_hull)) break;
       if (try_rung(degree, spans, target)) return best_;
+      if (best_.shape && further++ == kFurther) return best_;
+    }
+    for (int degree : {3, 4})
+      if (!any && try_gauge(degree, options_.spans, even_hull)) return best_;
+    for (const auto& [degree, spans] : kGaugeLadder) {
+      if (!any || too_many(degree, spans)) break;
+      const double falls = std::pow(gauge_spans_ / double(spans), kGaugeSteepest);
+      if (gauge_spans_ > 0 && gauge_error_ * falls > tolerance_) continue;
+      if (try_gauge(degree, spans, even_hull)) return best_;
       if (best_.shape && further++ == kFurther) break;
-      if (hopeless(spans)) break;
     }
     if (best_.shape) return best_;  // its convexity is measured, not proven
     throw ShapeError("no body of up to " + std::to_string(most_points_) +
@@ -340,10 +360,22 @@ class HullFitter {
     return false;
   }
 
-  // Whether not even errors that fall as a power of the spans, steeper than sharp edges let them, would do.
-  bool hopeless(int spans) const {
-    if (best_.shape || options_.spans > 0 || spans < kHopefulSpans || !(start_error_ < kFar)) return false;
-    return start_error_ * std::pow(spans / double(kMostSpans), kSteepest) > tolerance_;
+  bool too_many(int degree, int spans) const {
+    if (options_.most_points == 0) return false;
+    size_t points = 0;
+    const SmoothCube cube(degree, spans);
+    for (const NurbsSurface& s : cube.surfaces(NetPoints(NetPoints::Zero(cube.count(), 3))))
+      points += s.points.size();
+    return points > options_.most_points;
+  }
+
+  // Whether the error so far can't fall to the tolerance by going to this rung, or the rung costs too much
+  // for what it may bring.
+  bool too_coarse(int degree, int spans) const {
+    if (!(start_error_ < kFar)) return spans >= kCostlySpans;
+    const double gain =
+        std::pow(spans / double(start_spans_), kSteepest) * (degree > start_degree_ ? kRaised : 1);
+    return start_error_ > gain * tolerance_ || (spans >= kCostlySpans && start_error_ > kNear * tolerance_);
   }
 
   // A body of revolution of few corners, as cylinders and cones are: flat faces and straight sides stay so,
@@ -388,18 +420,27 @@ class HullFitter {
     polyhedron_tried_ = true;
     const std::vector<HalfSpace> faces = facets(hull_, kMostFaces);
     if (faces.empty()) return false;
-    double rounding = tolerance_;
     const std::string kind = "polyhedron of " + std::to_string(faces.size()) + " faces with rounded edges";
-    try {
-      for (int k = 0; k < kRoundings; ++k) {
-        const auto body = make_shape("fit", rounded_polyhedron(faces, mass_.center, rounding));
-        if (k + 1 == kRoundings && judge(body->surfaces, kind, true)) return true;
+    const auto rounded = [&](double rounding) {
+      return make_shape("fit", rounded_polyhedron(faces, mass_.center, rounding));
+    };
+    double rounding = tolerance_;
+    std::string why;
+    for (int k = 0, halved = 0; k < kRoundings && halved <= kHalvings;) {
+      try {
+        const auto body = rounded(rounding);
+        if (++k == kRoundings && judge(body->surfaces, kind, true)) return true;
         const HullDistance d = hull_distance(*body, hull_, 0.01 * tolerance_);
-        rounding *= 0.97 * tolerance_ / d.worst();  // a corner's distance grows with it
+        const double next = rounding * kAim * tolerance_ / d.worst();  // a corner's distance grows with it
+        rounding = halved > 0 ? std::min(next, rounding) : next;
+      } catch (const ShapeError& error) {  // too round for a thin body
+        why = error.what();
+        rounding *= 0.5;
+        k = 0;
+        ++halved;
       }
-    } catch (const ShapeError& error) {
-      say(kind + ": " + error.what());
     }
+    if (!why.empty()) say(kind + ": " + why);
     return false;
   }
 
@@ -418,6 +459,8 @@ class HullFitter {
       fit = fit_convex(cube, fit.points, offset, aimed_at(aim));
       if (fit.error < start_error_) {
         start_error_ = fit.error;
+        start_degree_ = degree;
+        start_spans_ = spans;
         start_ = cube.surfaces(fit.points);
       }
       if (fit.error > aim || aim <= tolerance_) break;
@@ -450,14 +493,63 @@ class HullFitter {
     return accepted;
   }
 
+  // What the first rung of gauge functions can reach tells soon what polynomial patches of about as many
+  // points can.
+  bool polynomials_may_do(const ConvexHull& even) {
+    if (gauge_spans_ == 0) {
+      GaugeFitOptions options;
+      options.inward = kAim * tolerance_;
+      options.outward = kOutwardAim * tolerance_;
+      options.metric = frame_.metric;
+      const auto& [degree, spans] = kGaugeLadder[0];
+      options.least_curvature = kLeastCurvature;
+      gauge_error_ = fit_gauge(degree, spans, even, options).error * kAim * tolerance_;
+      gauge_spans_ = spans;
+    }
+    return gauge_error_ < kPolynomialGain * tolerance_;
+  }
+
+  // More points, but sure to converge.
+  bool try_gauge(int degree, int spans, const ConvexHull& even) {
+    const int count = SmoothCube(degree, spans).count();
+    most_points_ = std::max(most_points_, count);
+    const std::string kind = std::string(degree == 3 ? "rational bicubic" : "rational biquartic") + ", " +
+                             std::to_string(spans) + " x " + std::to_string(spans) + " spans, " +
+                             std::to_string(count) + " control points";
+    GaugeFitOptions options;
+    options.inward = kAim * tolerance_;
+    options.outward = kOutwardAim * tolerance_;
+    options.metric = frame_.metric;
+    for (double share : kGaugeCurvatures) {
+      options.least_curvature = std::clamp(share * tolerance_ / radius_, kLeastCurvature, kMostCurvature);
+      for (int pass = 0; pass < 2; ++pass) {  // what certifies further away is asked to be nearer
+        GaugeFit fit = fit_gauge(degree, spans, even, options);
+        gauge_error_ = fit.error * kAim * tolerance_;
+        gauge_spans_ = spans;
+        if (fit.error > 1) break;
+        transform(fit.surfaces, frame_.from, frame_.center);
+        if (judge(std::move(fit.surfaces), kind)) return true;
+        if (judged_.worst() <= tolerance_) return false;
+        options.inward *= std::min(1.0, kAim * tolerance_ / judged_.inward);
+        options.outward *= std::min(1.0, kAim * tolerance_ / judged_.outward);
+      }
+      if (gauge_error_ < kAim * tolerance_ || gauge_error_ > kGaugeGain * tolerance_) break;
+    }
+    if (gauge_error_ > kAim * tolerance_) {
+      say(kind + ": off by about " + percent(gauge_error_ / radius_));
+      least_ = std::min(least_, gauge_error_ / radius_);
+    }
+    return false;
+  }
+
   ConvexFitOptions aimed_at(double aim) const {
     ConvexFitOptions options;
-    options.tolerance = 0.97 * aim;
+    options.tolerance = kAim * aim;
     options.slide = kFirstSlide;
     options.least_curvature =
-        std::clamp(kCurvatureShare * options.tolerance, kLeastCurvature, kMostCurvature);
-    options.most_curvature = 1 / options.tolerance;
-    options.metric = frame_.to.transpose();
+        std::clamp(kCurvatureShare * options.tolerance / radius_, kLeastCurvature, kMostCurvature);
+    options.most_curvature = radius_ / options.tolerance;
+    options.metric = frame_.metric;
     return options;
   }
 
@@ -469,6 +561,7 @@ class HullFitter {
     now.surfaces = std::move(surfaces);
     now.radius = radius_;
     now.kind = kind;
+    judged_ = {};
     std::vector<std::string> warnings;
     try {
       now.shape = make_shape("fit", now.surfaces, std::nullopt, &warnings);
@@ -478,9 +571,10 @@ class HullFitter {
     }
     if (!warnings.empty() || now.shape->concavity > 1e-9 * radius_) {
       say(kind + ": dented");
+      ++dents_;
       return false;
     }
-    now.distance = hull_distance(*now.shape, hull_, 0.01 * tolerance_);
+    now.distance = judged_ = hull_distance(*now.shape, hull_, 0.01 * tolerance_);
     const double error = now.distance.worst() / radius_;
     char radii[64];
     std::snprintf(radii, sizeof radii, ", curvature radius up to %.3g",
@@ -505,6 +599,9 @@ class HullFitter {
   int most_points_ = 0;
   double radius_ = 0, tolerance_ = 0, least_ = kFar, start_error_ = kFar;
   std::vector<NurbsSurface> start_;
+  int dents_ = 0, start_degree_ = 0, start_spans_ = 0, gauge_spans_ = 0;
+  double gauge_error_ = kFar;
+  HullDistance judged_;  // of the last body that loaded without a dent
   bool polyhedron_tried_ = false, revolution_tried_ = false;
   HullFit best_;
 };
@@ -519,8 +616,22 @@ HullDistance hull_distance(const Shape& shape, const ConvexHull& hull, double re
   return out;
 }
 
+// At a scale at which the radius is about 1, so that no unit of length is too small or too large.
 HullFit fit_hull(const ConvexHull& hull, const HullFitOptions& options) {
-  return HullFitter(hull, options).run();
+  const int power = std::ilogb(std::sqrt(2.0) * bounding_radius(hull, hull.properties().center));
+  if (power == 0) return HullFitter(hull, options).run();
+  std::vector<Vec3> points;
+  for (const Vec3& p : hull.mesh().points)
+    points.emplace_back(std::ldexp(p[0], -power), std::ldexp(p[1], -power), std::ldexp(p[2], -power));
+  const ConvexHull near_one(points);
+  HullFit fit = HullFitter(near_one, options).run();
+  const double scale = std::ldexp(1.0, power);
+  transform(fit.surfaces, scale * Mat3::Identity(), Vec3::Zero());
+  fit.shape = make_shape("fit", fit.surfaces);
+  fit.radius *= scale;
+  fit.distance.outward *= scale;
+  fit.distance.inward *= scale;
+  return fit;
 }
 
 }  // namespace nurbs

@@ -26,6 +26,7 @@ HullDistance hull_distance(const Shape& shape, const ConvexHull& hull, double re
 struct HullFitOptions {
   double tolerance = 0.01;                           // of the hull's bounding radius about its centre of mass
   int spans = 0;                                     // per patch and direction, 0: as few as do
+  size_t most_points = 0;                            // in all surfaces together, 0: any number
   std::function<void(const std::string&)> progress;  // told what was tried, a line at a time
 };
 
@@ -37,11 +38,13 @@ struct HullFit {
   std::string kind;   // "sphere" or "bicubic, 2 x 2 spans", ...
 };
 
-// The first of: an exact sphere; bicubic and biquartic bodies of smooth joints on six patches of growing
-// numbers of spans, whose certified distance is within the tolerance, which load without a dent and are
-// proven convex; of that many spans then the one of the largest least curvature found. Where none is proven
-// convex, the first that is within the tolerance. Throws ShapeError when there is none, naming the best that
-// was reached.
+// The first of: an exact sphere; bodies of revolution and polyhedra with their edges rounded, where the hull
+// is nearly one of few corners; bicubic and biquartic bodies of smooth joints on six patches of growing
+// numbers of spans, polynomial ones first (convex_fit.h), then rational ones (gauge_fit.h), whose certified
+// distance is within the tolerance, which load without a dent and are proven convex; of that many spans then
+// the one of the largest least curvature found. Where none is proven convex, the first that is within the
+// tolerance. Throws ShapeError when there is none, naming the best that was reached. Seconds; 10 to 50 where
+// a rough hull wants thousands of points.
 HullFit fit_hull(const ConvexHull& hull, const HullFitOptions& options);
 
 }  // namespace nurbs

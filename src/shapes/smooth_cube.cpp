@@ -1,8 +1,10 @@
 // Spline bases and joint conditions over a cube.
 #include "shapes/smooth_cube.h"
 
+#include <Eigen/SparseCholesky>
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <map>
 
 namespace nurbs {
@@ -12,10 +14,19 @@ int knot_multiplicity(int degree) {
   return degree <= 3 ? std::max(degree - 1, 1) : degree - 2;
 }
 
-std::vector<double> spline_knots(int degree, int spans, int multiplicity) {
-  std::vector<double> knots(degree + 1, 0.0);
-  for (int k = 1; k < spans; ++k) knots.insert(knots.end(), multiplicity, static_cast<double>(k) / spans);
-  knots.insert(knots.end(), degree + 1, 1.0);
+std::vector<double> span_ends(int spans, CubeKind kind) {
+  std::vector<double> ends;
+  for (int k = 0; k <= spans; ++k) {
+    const double at = static_cast<double>(k) / spans, inside = std::tan((2 * at - 1) * M_PI / 4);
+    ends.push_back(kind == CubeKind::points ? at : k == 0 ? -1 : k == spans ? 1 : inside);
+  }
+  return ends;
+}
+
+std::vector<double> spline_knots(int degree, const std::vector<double>& ends, int multiplicity) {
+  std::vector<double> knots(degree + 1, ends.front());
+  for (size_t k = 1; k + 1 < ends.size(); ++k) knots.insert(knots.end(), multiplicity, ends[k]);
+  knots.insert(knots.end(), degree + 1, ends.back());
   return knots;
 }
 
@@ -46,17 +57,25 @@ void raise(const std::vector<double>& knots, int q, int k, const double* lower, 
 
 }  // namespace
 
-SmoothCube::SmoothCube(int degree, int spans)
-    : degree_(degree),
+SmoothCube::SmoothCube(int degree, int spans, CubeKind kind)
+    : kind_(kind),
+      degree_(degree),
       spans_(spans),
       multiplicity_(knot_multiplicity(degree)),
-      knots_(spline_knots(degree, spans, multiplicity_)),
+      breaks_(span_ends(spans, kind)),
+      knots_(spline_knots(degree, breaks_, multiplicity_)),
       net_((spans - 1) * multiplicity_ + degree + 1),
       conditions_(joint_conditions()) {}
 
+int SmoothCube::span_of(double parameter) const {
+  int a = 0;
+  while (a + 1 < spans_ && parameter > breaks_[a + 1]) ++a;
+  return a;
+}
+
 SmoothCube::Basis SmoothCube::basis(int a, double t) const {
   const int k = degree_ + a * multiplicity_;
-  const double at = (a + t) / spans_;
+  const double at = parameter(a, t);
   Basis out{};
   splines(knots_, degree_, k, at, out.value);
   double lower[kMaxDegree + 1];
@@ -70,7 +89,8 @@ SmoothCube::Basis SmoothCube::basis(int a, double t) const {
   return out;
 }
 
-// D1 + D2 - (2 t - 1) e' at degree + 1 places of every span, which makes it vanish all along.
+// D1 + D2 - (2 t - 1) e', or D1 + D2 - (t g' - g), at degree + 1 places of every span, which makes it vanish
+// all along.
 Eigen::SparseMatrix<double> SmoothCube::joint_conditions() const {
   const int last = net_.size() - 1;
   const Basis start = basis(0, 0);
@@ -89,7 +109,7 @@ Eigen::SparseMatrix<double> SmoothCube::joint_conditions() const {
     };
     for (int a = 0; a < spans_; ++a) {
       for (int place = 0; place <= degree_; ++place) {
-        const double t = (place + 0.5) / (degree_ + 1), whole = (a + t) / spans_;
+        const double t = (place + 0.5) / (degree_ + 1), whole = parameter(a, t);
         const Basis s = basis(a, t);
         std::map<int, double> row;
         for (int k = 0; k <= degree_; ++k) {
@@ -97,7 +117,9 @@ Eigen::SparseMatrix<double> SmoothCube::joint_conditions() const {
           const double across = start.slope[1] * s.value[k];
           row[at(at_k, b1, c0)] += across;
           row[at(at_k, b0, c1)] += across;
-          row[at(at_k, b0, c0)] -= 2 * across + (2 * whole - 1) * s.slope[k];
+          const double along =
+              kind_ == CubeKind::points ? (2 * whole - 1) * s.slope[k] : whole * s.slope[k] - s.value[k];
+          row[at(at_k, b0, c0)] -= 2 * across + along;
         }
         double length = 0;
         for (const auto& [column, value] : row) length += value * value;
@@ -111,12 +133,44 @@ Eigen::SparseMatrix<double> SmoothCube::joint_conditions() const {
   return out;
 }
 
+// The shortest correction, four times.
+Eigen::MatrixXd SmoothCube::tidied(Eigen::MatrixXd points) const {
+  const Eigen::SparseMatrix<double> normal =
+      conditions_ * Eigen::SparseMatrix<double>(conditions_.transpose());
+  Eigen::SparseMatrix<double> regular(normal.rows(), normal.rows());
+  regular.setIdentity();
+  const Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>> solver(
+      Eigen::SparseMatrix<double>(normal + 1e-11 * regular));
+  for (int pass = 0; pass < 4; ++pass)
+    points -= conditions_.transpose() * Eigen::MatrixXd(solver.solve(Eigen::MatrixXd(conditions_ * points)));
+  return points;
+}
+
 std::vector<NurbsSurface> SmoothCube::surfaces(const NetPoints& points) const {
   std::vector<Vec4> homogeneous;
   homogeneous.reserve(points.rows());
   for (int k = 0; k < points.rows(); ++k)
     homogeneous.emplace_back(points(k, 0), points(k, 1), points(k, 2), 1);
   return cube_surfaces(net_, degree_, knots_, homogeneous);
+}
+
+// y is linear over a face, so that its control points are y at the knots' means.
+std::vector<NurbsSurface> SmoothCube::surfaces(const Eigen::VectorXd& gauge) const {
+  std::vector<double> knots, means;
+  for (double knot : knots_) knots.push_back(0.5 * (knot + 1));
+  for (int i = 0; i < net_.size(); ++i) {
+    double sum = 0;
+    for (int k = 1; k <= degree_; ++k) sum += knots_[i + k];
+    means.push_back(sum / degree_);
+  }
+  std::vector<Vec4> homogeneous(static_cast<size_t>(count()));
+  for (int f = 0; f < kCubeFaces; ++f)
+    for (int i = 0; i < net_.size(); ++i)
+      for (int j = 0; j < net_.size(); ++j) {
+        const int at = net_.index(f, i, j);
+        homogeneous[at] << cube_direction(f, means[i], means[j]), gauge[at];
+      }
+  return cube_surfaces(net_, degree_, knots, homogeneous);
 }
 
 }  // namespace nurbs

@@ -17,8 +17,9 @@ namespace nurbs {
 namespace {
 
 constexpr double kFinest = 2e-4, kCoarsest = 0.5;
-constexpr double kWeld = 1e-7;  // of the extent: points closer are one
-constexpr int kSpansAtMost = 8;
+constexpr double kWeld = 1e-7;                              // of the extent: points closer are one
+constexpr double kLeastExtent = 1e-29, kMostExtent = 1e29;  // a shape file's are 1e-30 to 1e30
+constexpr double kFarthest = 1e9;                           // of the extent: distance from the origin
 constexpr int kSampleGrid =
     64;  // per patch parameter of a body to simplify, over all Bezier patches of a side
 
@@ -55,6 +56,13 @@ size_t chosen_piece(const FitArguments& a, const std::vector<TriangleMesh>& piec
 TriangleMesh closed_piece(const FitArguments& a, const TriangleMesh& raw) {
   const double size = extent(raw);
   if (!(size > 0)) throw ShapeError(a.file + ": all points coincide");
+  if (!(size >= kLeastExtent && size <= kMostExtent))
+    throw ShapeError(a.file + ": its extent is " + format("%.3g", size) + ", must be 1e-29 to 1e29");
+  double farthest = 0;
+  for (const Vec3& p : raw.points) farthest = std::max(farthest, p.norm());
+  if (farthest > kFarthest * size)
+    throw ShapeError(a.file + ": lies " + format("%.2g", farthest / size) +
+                     " times its size from the origin, which leaves its coordinates too few digits: move it");
   const std::vector<TriangleMesh> pieces = split_pieces(weld(raw, kWeld * size));
   if (pieces.empty()) throw ShapeError(a.file + ": no triangle has an area");
   TriangleMesh mesh = pieces[chosen_piece(a, pieces)];
@@ -78,9 +86,9 @@ TriangleMesh closed_piece(const FitArguments& a, const TriangleMesh& raw) {
 
 int spans_of(const std::string& patches) {
   if (patches.empty()) return 0;
-  for (int spans : {1, 2, 3, 4, 6, 8})
+  for (int spans : {1, 2, 3, 4, 6, 8, 10, 12})
     if (patches == std::to_string(6 * spans * spans)) return spans;
-  throw UsageError("--patches is " + patches + ", must be 6, 24, 54, 96, 216 or 384");
+  throw UsageError("--patches is " + patches + ", must be 6, 24, 54, 96, 216, 384, 600 or 864");
 }
 
 double worst_kink(const Shape& shape) {
@@ -103,8 +111,9 @@ void print_differences(const char* to, const MassProperties& fit, const MassProp
               100 * (fit.center - reference.center).norm() / radius, 100 * moment_error(fit, reference));
 }
 
-HullFit fit_with_progress(const ConvexHull& hull, double tolerance, int spans) {
+HullFit fit_with_progress(const ConvexHull& hull, double tolerance, int spans, size_t most_points = 0) {
   HullFitOptions options;
+  options.most_points = most_points;
   options.tolerance = tolerance;
   options.spans = spans;
   options.progress = [](const std::string& line) {
@@ -211,7 +220,7 @@ void simplify(const FitArguments& a) {
     if (sag > 0.5 * tolerance)
       throw ShapeError("the tolerance of " + format("%.3g", 100 * tolerance) +
                        " % is finer than the body is sampled, " + format("%.2g", 200 * sag) + " % at least");
-    best = fit_with_progress(hull, tolerance - sag, spans_of(a.patches));
+    best = fit_with_progress(hull, tolerance - sag, spans_of(a.patches), control_points(shape->surfaces) - 1);
   } catch (const ShapeError& error) {
     throw ShapeError(a.file + ": " + error.what());
   }
@@ -233,9 +242,11 @@ void simplify(const FitArguments& a) {
 constexpr char kFitNotes[] =
     "The mesh must be closed; points may be doubled, triangles wound either way. The body is a smooth convex "
     "one\n"
-    "near the mesh's convex hull: the simplest of a sphere and six bicubic or biquartic patches of 1, 2, 3, "
-    "4, 6, 8\n"
-    "spans whose largest distance from the hull, either way, is proven to be within the tolerance, a share "
+    "near the mesh's convex hull: the simplest of a sphere and six bicubic or biquartic patches, polynomial "
+    "of "
+    "1 to 4\n"
+    "spans, rational of 4, 6, 8, 10, 12, whose largest distance from the hull, either way, is proven to be "
+    "within the tolerance, a share "
     "of the\n"
     "hull's largest radius about its centre of mass, and which is proven convex where one is; its flattest "
     "places bulge\n"
@@ -258,7 +269,8 @@ Command add_fit(CLI::App& app) {
   command->add_option("-o", a->output, "shape file to write")->type_name("FILE")->required();
   command->add_option("--tolerance", a->tolerance, "as 2% or 0.02, default 1%")->type_name("T");
   command
-      ->add_option("--patches", a->patches, "6, 24, 54, 96, 216 or 384 Bezier patches; default: as few as do")
+      ->add_option("--patches", a->patches,
+                   "6, 24, 54, 96, 216, 384, 600 or 864 Bezier patches; default: as few as do")
       ->type_name("N");
   command
       ->add_option("--keep", a->keep,
