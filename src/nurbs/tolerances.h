@@ -138,12 +138,12 @@ constexpr double kSingularMetric = 1e-24;  // square of the sine of the angle be
 constexpr int kStepHalvings = 40;          // of a step that does not ascend: 1e-12 of it is left
 
 // --- highest point of a patch
-constexpr int kMaximumBoxes = 2000;    // of one patch; 3 to 30 are usual
-constexpr int kMaximumDepth = 80;      // halvings: both parameters to round-off
-constexpr double kConcaveShare = 0.1;  // of the second derivatives that the mixed one must leave
-constexpr int kConcaveSteps = 8;       // of Newton in a concave box
-constexpr double kConcaveRest = 1e-6;  // of the slack: what the gradient left may hide
-constexpr double kSupportSlack = 2;    // round-offs of a body that its support may lack
+constexpr int kMaximumBoxes = 2000;     // of one patch; 3 to 30 are usual
+constexpr int kMaximumDepth = 80;       // halvings: both parameters to round-off
+constexpr double kConcaveShare = 1e-3;  // of the second derivatives that the mixed one must leave
+constexpr int kConcaveSteps = 8;        // of Newton in a concave box
+constexpr double kConcaveRest = 1e-6;   // of the slack: what the gradient left may hide
+constexpr double kSupportSlack = 2;     // round-offs of a body that its support may lack
 
 // --- particles
 constexpr double kUnitTurn = 1e-14;  // of a quaternion's squared length: within it the body is its own size
@@ -196,7 +196,7 @@ constexpr double kCoreShare = 0.5;      // of the smaller of the bodies' least c
 constexpr double kFlatStart = 1e-3;     // volume of a first tetrahedron over its longest edge cubed, at least
 constexpr int kFlatRounds = 4;          // of looking for a better one
 constexpr double kLeastHeight = 0.02;   // of the tolerance: a point less high above a face is not added
-constexpr double kSupportShare = 1e-5;  // of the tolerance that a support may lack
+constexpr double kSupportShare = 0.01;  // of the tolerance that a support may lack
 constexpr int kMostMinima = 8;          // of p(d) that are gone straight to and surrounded
 constexpr double kPolishAbove = 0.1;  // of the least overlap seen: one more than that above it is no minimum
 constexpr double kSurroundAbove = 1e-3;  // the same for surrounding it
