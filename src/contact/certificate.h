@@ -35,10 +35,11 @@ struct Bracket {
   double width() const { return upper - lower; }
 };
 
-// Excess of h(d) over d . (surface point with normal n).
+// Excess of h(d) over d . (surface point with normal n). `noise`: what n may err by, rad.
 inline double support_excess(const Shape& shape, double scale, const RollingRadii& radii, const Vec3& d,
-                             const Vec3& n) {
-  const double chord2 = (d - n).squaredNorm();  // 2 (1 - cos), without cancellation
+                             const Vec3& n, double noise = 0) {
+  double chord2 = (d - n).squaredNorm();  // 2 (1 - cos), without cancellation
+  if (noise > 0) chord2 += noise * (2 * std::sqrt(chord2) + noise);
   if (chord2 <= kNormalMargin * kNormalMargin && radii.near < kFarAway)
     return 0.5 * scale * radii.near * chord2;
   return scale * (rolling_excess(radii.outer, shape.bounding_radius, chord2) + radii.slack);
@@ -52,7 +53,7 @@ inline RollingRadii radii_at(const Shape& shape, const SurfacePoint& at, const M
   return rolling_radii(shape, at, axes ? Vec3(axes->transpose() * n) : n);
 }
 
-inline Bracket certify(const PairFrame& pair, const PointPair& p) {
+inline Bracket certify(const PairFrame& pair, const PointPair& p, double noise_a, double noise_b) {
   const RollingRadii radii_a = radii_at(*pair.a, p.on_a, nullptr, p.na),
                      radii_b = radii_at(*pair.b, p.on_b, &pair.turn, p.nb);
   // A flat part has no largest ball; one as large as the other body's reach does.
@@ -75,8 +76,8 @@ inline Bracket certify(const PairFrame& pair, const PointPair& p) {
   bracket.dented = dented(*pair.a, radii_a) || dented(*pair.b, radii_b);
   const double slack = pair.scale_a * pair.a->joint_slack + pair.scale_b * pair.b->joint_slack;
   bracket.upper = distance - rho_a - rho_b + slack + roundoff;
-  bracket.lower = d.dot(p.b - p.a) - support_excess(*pair.a, pair.scale_a, radii_a, d, p.na) -
-                  support_excess(*pair.b, pair.scale_b, radii_b, -d, p.nb) - roundoff;
+  bracket.lower = d.dot(p.b - p.a) - support_excess(*pair.a, pair.scale_a, radii_a, d, p.na, noise_a) -
+                  support_excess(*pair.b, pair.scale_b, radii_b, -d, p.nb, noise_b) - roundoff;
   return bracket;
 }
 

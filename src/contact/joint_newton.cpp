@@ -10,6 +10,8 @@ namespace {
 
 using Slot = JetLanes::Slot;
 
+constexpr double kTangentNoise = 4 * kRoundoff;  // of the body: round-off of a surface tangent
+
 // Both surfaces at the current parameters, in the pair frame.
 NURBS_INLINE void evaluate(const PairFrame& pair, const Mat3& frame_b, JointSolution& s) {
   s.base_a = s.points.on_a;
@@ -115,12 +117,16 @@ NURBS_INLINE SurfacePoint advance(const Shape& shape, SurfacePoint p, const Vec2
 struct Normal {
   Vec3 direction;
   bool polar;
+  double noise = 0;  // rad: of the shorter tangent's round-off, where that counts
 };
-NURBS_INLINE Normal outward(const JetLanes& j, const SurfacePoint& at) {
+NURBS_INLINE Normal outward(const JetLanes& j, const SurfacePoint& at, double size) {
   const Vec3 su = j.at(Slot::kSu), sv = j.at(Slot::kSv);
   const double lu = su.squaredNorm(), lv = sv.squaredNorm();
   constexpr double kLost = kPoleNormal * kPoleNormal;
   Normal n{su.cross(sv), lu < kLost * lv || lv < kLost * lu};
+  const double shorter = std::min(lu, lv);
+  if (shorter < kNearPole * kNearPole * std::max(lu, lv) && !n.polar)
+    n.noise = kTangentNoise * size / std::sqrt(shorter);
   if (n.polar) {
     const Vec3 suv = j.at(Slot::kSuv);
     n.direction = lu < lv ? suv.cross(sv) : su.cross(suv);
@@ -215,10 +221,11 @@ JointSolution solve_joint(const PairFrame& pair, const SurfacePoint& on_a, const
     evaluate(pair, frame_b, out);
     p.a = out.jet_a.at(Slot::kS);
     p.b = out.jet_b.at(Slot::kS);
-    const Normal na = outward(out.jet_a, p.on_a), nb = outward(out.jet_b, p.on_b);
+    const Normal na = outward(out.jet_a, p.on_a, pair.scale_a * pair.a->bounding_radius),
+                 nb = outward(out.jet_b, p.on_b, pair.scale_b * pair.b->bounding_radius);
     p.na = na.direction;
     p.nb = nb.direction;
-    out.bracket = certify(pair, p);
+    out.bracket = certify(pair, p, na.noise, nb.noise);
     out.dented = out.bracket.dented;
     out.converged = close_enough(out.bracket, tolerance, pair.size) || far_enough(out.bracket, enough);
     out.stationary = !out.converged && is_stationary(pair, p);

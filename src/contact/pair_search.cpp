@@ -19,6 +19,8 @@
 namespace nurbs {
 namespace {
 
+constexpr double kNormalShare = 0.5;  // of the tolerance, by which the overlap along a normal may exceed it
+
 bool set_separated(double lower, double reach, Rung rung, ContactResult* r) {
   if (!(lower > reach)) return false;
   set_apart(lower, rung, r);
@@ -201,15 +203,15 @@ class Ladder {
     return fallback(pair, have ? &best : nullptr, lowest->d, tolerance, spent);
   }
 
-  // Whether the overlap along a polished normal is the polished gap: of a body next to one much larger,
-  // normals may be right to the tolerance of the angle, and the overlap along them not.
-  static bool agrees(const PairFrame& pair, const JointSolution& s, double tolerance) {
+  // Whether the overlap along a polished normal is that of a gap: of a body next to one much larger, or on a
+  // flat, normals may be right to the tolerance of the angle, and the overlap along them not.
+  static bool agrees(const PairFrame& pair, const JointSolution& s, double gap, double tolerance) {
     const double enough = kSupportShare * tolerance;
     const Support a = find_hull_support(*pair.a, s.normal, &s.points.on_a, enough / pair.scale_a),
                   b = find_hull_support(*pair.b, pair.direction_on_b(s.normal), &s.points.on_b,
                                         enough / pair.scale_b);
     const double p = pair.scale_a * a.h + pair.scale_b * b.h - s.normal.dot(pair.offset);
-    return -p >= s.gap - tolerance;
+    return -p >= gap - kNormalShare * tolerance;
   }
 
   // The polytope brackets the global answer; a stationary point that lies inside its bracket is a better
@@ -232,16 +234,18 @@ class Ladder {
       joint = solve_joint(pair, hull.points.on_a, hull.points.on_b, tolerance, settings_.reach,
                           kPolishIterations);
       spent += joint.iterations;
-      if (joint.converged && agrees(pair, joint, tolerance))
+      if (joint.converged && agrees(pair, joint, joint.gap, tolerance))
         return finish(pair, joint, joint.normal, Rung::fallback, spent);
       polished =
           joint.stationary && joint.gap <= hull.bracket.upper && joint.gap >= hull.bracket.lower - tolerance;
     }
-    if (polished && agrees(pair, joint, tolerance)) {
+    const double lower = std::max(hull.bracket.lower, joint.bracket.lower);
+    const double gap = std::clamp(joint.gap, lower, std::max(lower, hull.bracket.upper));
+    if (polished && agrees(pair, joint, gap, tolerance)) {
       hull.points = joint.points;
       hull.bracket.direction = joint.normal;
-      hull.bracket.lower = std::max(hull.bracket.lower, joint.bracket.lower);
-      hull.gap = std::clamp(joint.gap, hull.bracket.lower, hull.bracket.upper);
+      hull.bracket.lower = lower;
+      hull.gap = gap;
     }
     hull.converged = hull.bracket.width() <= tolerance;
     return finish(pair, hull, hull.bracket.direction, Rung::fallback, spent);
