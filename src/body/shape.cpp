@@ -9,6 +9,7 @@
 #include "body/connectivity.h"
 #include "body/convexity.h"
 #include "body/mass_properties.h"
+#include "body/rounding.h"
 #include "body/surface_bounds.h"
 #include "nurbs/tolerances.h"
 
@@ -256,6 +257,8 @@ void measure(Draft& draft) {
   if (kinks.gap > kJointRoundoff * s.bounding_radius) s.joint_slack = kGapsCrossed * kinks.gap;
   SurfaceBounds bounds = bound_surface(s, is_sphere(s));
   if (is_sphere(s)) take_as_sphere(s, &bounds);
+  const double rounding = least_rounding(s.patches);
+  if (rounding < kFarAway) bounds.radii.min_radius = std::max(bounds.radii.min_radius, rounding);
   s.proofs = summarise(s, bounds, kinks);
   s.patch_curvature = bounds.radii;
   s.curvature = add_kinks(s.patch_curvature, kinks);

@@ -15,6 +15,8 @@ constexpr double kNearlyAlike = 0.1;    // of the body's radius: what directions
 constexpr double kClosedShare = 0.9;    // of the tolerance at which a sector is closed ...
 constexpr double kMeridianShare = 0.4;  // ... and below which its width, not its circles, keeps it open
 constexpr double kLeastTilt = 3e-3;     // sine between the axes from which the mate's tip may do better
+constexpr double kCore = 1 - 1e-12;     // of the largest ball that rolls inside the mate
+constexpr double kCoreDepth = 0.98;     // ... and of the overlap
 constexpr int kFirstAngles = 7;
 constexpr int kBeside = 3;              // circles looked at on either side of a range of angles
 constexpr double kChord = 1.05;         // up to 0.5 rad: no less than the angle over its chord or sine
@@ -31,8 +33,9 @@ struct View {
   bool circles;            // of M are used
   double tilt = 0;         // sine between the axes, if so
   double mate_error = 0;   // what the mate turns out of itself by, a length of its shape
+  double ball = 0;         // that rolls inside M, whose points are those of its core, the ball's centres
 
-  View(const PairFrame& pair, bool k_is_a) {
+  View(const PairFrame& pair, bool k_is_a, bool core) {
     sign = k_is_a ? 1 : -1;
     k = k_is_a ? pair.a : pair.b;
     m = k_is_a ? pair.b : pair.a;
@@ -57,6 +60,7 @@ struct View {
     const double sine = axis.cross(mate_axis).norm();
     circles = m->revolution.found && sine < kNearAxis;
     if (circles) tilt = sine;
+    if (core) ball = kCore * scale_m * std::min(m->curvature.min_radius, m->inner_radius);
   }
   Vec3 across(const Vec3& x) const { return x - axis.dot(x) * axis; }
 };
@@ -154,8 +158,9 @@ Least least_of_greatest(const Meridian* p, int count, Angle low, Angle high, dou
 
 class RingSearch {
  public:
-  RingSearch(const PairFrame& pair, bool k_is_a, double tolerance)
-      : pair_(pair), view_(pair, k_is_a), tolerance_(tolerance) {
+  // `core`: of the mate, and the ball that rolls inside it, instead of the mate.
+  RingSearch(const PairFrame& pair, bool k_is_a, bool core, double tolerance)
+      : pair_(pair), view_(pair, k_is_a, core), tolerance_(tolerance) {
     tangent_ = view_.axis.unitOrthogonal();
     second_ = view_.axis.cross(tangent_);
     noise_ = 2 * kRoundoff *
@@ -166,7 +171,8 @@ class RingSearch {
 
   bool run(PolytopeResult* result) {
     const Vec3 e = view_.sign * result->bracket.direction;
-    best_ = -result->bracket.lower;
+    view_.ball = std::min(view_.ball, -kCoreDepth * result->bracket.lower);
+    best_ = -result->bracket.lower - view_.ball;
     best_e_ = e;
     if (!(best_ > tolerance_) || !query(e)) return false;
     choose_mate(e);
@@ -223,7 +229,8 @@ class RingSearch {
                                         enough / view_.scale_m);
     ++queries_;
     Circle c;
-    const Vec3 x = view_.scale_k * (view_.turn_k * k.point), xm = view_.scale_m * (view_.turn_m * m.point);
+    const Vec3 x = view_.scale_k * (view_.turn_k * k.point),
+               xm = view_.turn_m * (view_.scale_m * m.point - view_.ball * m.normal);
     c.z = view_.axis.dot(x - view_.point);
     c.r = view_.across(x - view_.point).norm();
     c.at = {view_.axis.dot(e), view_.across(e).norm()};
@@ -237,7 +244,7 @@ class RingSearch {
     }
     c.k = view_.offset - view_.point + c.middle;
     insert(c);
-    const double p = view_.scale_k * k.upper + view_.scale_m * m.upper - e.dot(view_.offset);
+    const double p = view_.scale_k * k.upper + view_.scale_m * m.upper - view_.ball - e.dot(view_.offset);
     last_ = p;
     last_k_ = k.where;
     last_m_ = m.where;
@@ -386,6 +393,7 @@ class RingSearch {
       range += view_.tilt * sector.half / over.across;
       of_m = view_.scale_m * least_bend(*view_.m, to_m * -e, to_m * ((view_.mate_axis - y * e) / across),
                                         std::max(range, asked), false);
+      of_m = std::max(0.0, of_m - view_.ball);
       for (const Circle* c : {one, two}) of_m = std::min(of_m, c->rm / c->e.cross(view_.mate_axis).norm());
       for (Circle* c : {one, two}) {
         c->rm -= of_m * c->e.cross(view_.mate_axis).norm();
@@ -395,6 +403,7 @@ class RingSearch {
       asked = std::max((one->e - e).norm(), (two->e - e).norm());
       range += sector.half;
       of_m = view_.scale_m * least_bend(*view_.m, to_m * -e, along, std::max(range, asked), true);
+      of_m = std::max(0.0, of_m - view_.ball);
       for (Circle* c : {one, two}) c->k += of_m * c->e;
     }
     return of_k + of_m;
@@ -519,8 +528,8 @@ class RingSearch {
     r->iterations += queries_;
     const Vec3 d = view_.sign * best_e_;
     r->bracket.direction = d;
-    r->bracket.lower = -best_;
-    r->bracket.upper = std::max(-proven_, -best_);
+    r->bracket.lower = -best_ - view_.ball;
+    r->bracket.upper = std::max(-proven_ - view_.ball, r->bracket.lower);
     r->converged = true;
     r->points.na = d;
     r->points.nb = -d;
@@ -548,7 +557,7 @@ class RingSearch {
 
   void witness(const Circle& c, double phi, Vec3* on_k, Vec3* on_m) const {
     *on_k = view_.point + c.r * outward(phi) + c.z * view_.axis;
-    *on_m = c.middle;
+    *on_m = c.middle - view_.ball * best_e_;
     if (!view_.circles) return;
     const Vec3 e = direction(c.at, phi), square = e - view_.mate_axis.dot(e) * view_.mate_axis;
     if (square.norm() > kNoDirection) *on_m -= c.rm * square.normalized();
@@ -572,8 +581,16 @@ class RingSearch {
 bool search_rings(const PairFrame& pair, double tolerance, PolytopeResult* result) {
   for (const bool k_is_a : {true, false}) {
     const Shape& k = k_is_a ? *pair.a : *pair.b;
-    const bool ring = k.revolution.found && !k.proofs.sphere;
-    if (ring && RingSearch(pair, k_is_a, tolerance).run(result)) return true;
+    if (!k.revolution.found || k.proofs.sphere) continue;
+    const Shape& mate = k_is_a ? *pair.b : *pair.a;
+    const bool round = mate.curvature.min_radius > 0 && !mate.proofs.sphere;
+    // Circles of a mate about nearly the same axis serve better, unless it ends in spheres.
+    const Vec3 axis = k_is_a ? Vec3(pair.turn * mate.revolution.axis) : mate.revolution.axis,
+               own = k_is_a ? k.revolution.axis : Vec3(pair.turn * k.revolution.axis);
+    const bool near = mate.revolution.found && own.cross(axis).norm() < kNearAxis;
+    for (const bool core : {false, true})
+      if ((core ? round : near || !round) && RingSearch(pair, k_is_a, core, tolerance).run(result))
+        return true;
   }
   return false;
 }

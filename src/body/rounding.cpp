@@ -1,0 +1,81 @@
+// Centre and radius from two normals of a patch, the proof from its coefficients.
+#include "body/rounding.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "body/bounds.h"
+#include "nurbs/tolerances.h"
+
+namespace nurbs {
+namespace {
+
+constexpr double kRounded = 1e-13;     // of a patch's size and of the squared radius: off its quadric
+constexpr double kBentBy = 1e3;        // curvatures err by so many times as much, relatively ...
+constexpr double kBentAnyhow = 1e-11;  // ... and by this
+constexpr double kTwoNormals = 1e-3;   // rad: closer ones give no radius
+
+struct Sample {
+  Vec3 x, n;
+};
+
+// Away from the patch's edges, which may be collapsed.
+std::vector<Sample> samples_of(const BezierPatch& patch) {
+  std::vector<Sample> samples;
+  for (const double u : {0.05, 0.5, 0.95})
+    for (const double v : {0.05, 0.5, 0.95}) {
+      const Jet1 jet = evaluate1(patch, u, v);
+      samples.push_back({jet.s, jet.su.cross(jet.sv).normalized()});
+    }
+  return samples;
+}
+
+bool is_plane(const BezierPatch& patch, const Sample& s, double size) {
+  return std::all_of(patch.points.begin(), patch.points.end(), [&](const Vec4& p) {
+    return std::abs(s.n.dot(p.head<3>() / p[3] - s.x)) <= kRounded * size;
+  });
+}
+
+// How far |map (x - centre)|^2 is from 1, at most.
+double off_unit(BezierPatch patch, const Vec3& centre, const Mat3& map) {
+  for (Vec4& p : patch.points) p.head<3>() = map * (p.head<3>() - p[3] * centre);
+  const SquaredDistance square = squared_distance(patch, 1);
+  double most = 0;
+  for (std::size_t k = 0; k < square.num.size(); ++k)
+    most = std::max(most, std::abs(square.num[k]) / square.den[k]);
+  return most;
+}
+
+double radius_of(const BezierPatch& patch) {
+  const std::vector<Sample> samples = samples_of(patch);
+  const Sample* one = &samples[0];
+  const Sample* two = &samples[0];
+  double size = 0;
+  for (const Sample& s : samples)
+    for (const Sample& t : samples) {
+      size = std::max(size, (s.x - t.x).norm());
+      if ((s.n - t.n).squaredNorm() > (one->n - two->n).squaredNorm()) one = &s, two = &t;
+    }
+  const Vec3 turned = two->n - one->n;
+  if (!(turned.norm() > kTwoNormals)) return is_plane(patch, samples[4], size) ? kFarAway : 0;
+  const double radius = turned.dot(two->x - one->x) / turned.squaredNorm();
+  if (!(radius > 0)) return 0;
+  const Vec3 centre = one->x - radius * one->n, axis = one->n.cross(two->n).normalized();
+  const Mat3 sphere = Mat3::Identity() / radius,
+             cylinder = (Mat3::Identity() - axis * axis.transpose()) / radius;
+  const double off = std::min(off_unit(patch, centre, sphere), off_unit(patch, centre, cylinder));
+  return off <= kRounded ? radius * (1 - kBentAnyhow - kBentBy * off) : 0;
+}
+
+}  // namespace
+
+double least_rounding(const std::vector<BezierPatch>& patches) {
+  double least = kFarAway;
+  for (const BezierPatch& patch : patches) {
+    least = std::min(least, radius_of(patch));
+    if (!(least > 0)) return 0;
+  }
+  return least;
+}
+
+}  // namespace nurbs

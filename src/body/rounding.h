@@ -1,0 +1,17 @@
+// Bodies rounded by balls: planes, cylinders of revolution and spheres, whose least radius is known exactly.
+#pragma once
+
+#include <vector>
+
+#include "nurbs/bezier_patch.h"
+
+namespace nurbs {
+
+// The least radius of the cylinders and spheres if every patch lies in one, or in a plane, to kRounded of its
+// size (proven from Bernstein coefficients), less what their round-off may bend them by; 0 where a patch does
+// not, infinite where all are plane. Enclosed curvatures (surface_bounds.h) are tight to kRadiusTightness
+// only: with those, a sphere about a point of a mate's axis would not be told from one a little beside it,
+// and neither would the ring of directions in which they overlap by the same.
+double least_rounding(const std::vector<BezierPatch>& patches);
+
+}  // namespace nurbs
