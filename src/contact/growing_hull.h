@@ -40,6 +40,8 @@ class GrowingHull {
 
   // Keeps a point without adding it to the surface; its number, or -1 when full.
   int store(const Vec3& point);
+  // Puts a stored point elsewhere: the surface has to be started again.
+  void move(int k, const Vec3& point) { point_[k] = point; }
   // Starts from four stored points; false when they span no volume. Starting again drops the old surface.
   bool start(int a, int b, int c, int d);
   // Adds a stored point: the triangles that it sees make way for a fan over their horizon. `below`: a

@@ -4,7 +4,9 @@
 #include <array>
 #include <cmath>
 
+#include "body/cube_map.h"
 #include "contact/growing_hull.h"
+#include "contact/pair_memory.h"
 #include "contact/ring_search.h"
 #include "contact/support_turn.h"
 
@@ -17,6 +19,27 @@ struct Witness {
   Vec3 d;     // asked
   double p;   // upper bound of the overlap along it
   SurfacePoint on_a, on_b;
+  bool cap;  // no point of the obstacle: see Search::cover
+};
+
+// Directions within `proven` of d have an overlap (of the cores) of at least `level`; those within `used` of
+// it are given away to the hull's point `vertex`.
+struct Cap {
+  Vec3 d;
+  double level;
+  double proven, used;  // cosines
+  double slope;         // of the overlap at d, at most
+  int vertex, from;     // the minimum's own
+};
+
+// What is known of a body's inverse Weingarten maps W about a direction d: the support's, in a frame of d's
+// tangent plane, less `rate` times the angle from d up to `reach`, and balls.
+struct Bend {
+  Mat2 turn = Mat2::Zero();
+  double least = 0, most = 0;  // its eigenvalues
+  double rate = 0, reach = 0;
+  std::array<double, kInnerCaps.size()> ball{}, within{};     // radius for directions within an angle of d
+  std::array<double, kStretchCaps.size()> stretch{}, near{};  // the same from finer cells
 };
 
 constexpr int kBeforeRings = 64;          // queries before rings of directions are looked for
@@ -25,6 +48,10 @@ constexpr double kPolar = 0.1;            // sine of the angle from it
 constexpr int kMostIdle = 30;             // queries in a row that leave the bracket as it is
 constexpr double kOneMinimum = 1 - 1e-6;  // cosine above which Newton has come to one minimum again
 constexpr double kFlatBend = 1e-3;        // of the overlap, of its bend along a crease
+constexpr double kCapDepth = 0.4;         // of the tolerance, that a cap proves less than the least overlap
+constexpr double kCapUsed = 0.8;          // of a cap's angle: the rest is for lower minima found later
+constexpr double kWidestCap = 0.42, kLeastCap = 1e-4, kNextCap = 0.75;  // rad
+constexpr double kOffNormal = 1e-6;  // rad: a support's normal further from its direction is no W of it
 
 // Everything the search over directions keeps.
 class Search {
@@ -58,19 +85,24 @@ class Search {
   // Until `most` points are spent. May be gone on with.
   void run(double enough, int most) {
     settle(best_);
-    double last = kFarAway;
+    double last = kFarAway, near_before = -kFarAway;
     std::array<short, 3> asked = {-1, -1, -1};
     for (int idle = 0; hull_.points() < most; ++idle) {
       const int near = best_face();
       if (near < 0 || upper_ - lower_ <= tolerance_ || lower_ > enough) return;
-      if (upper_ - lower_ < last) idle = 0;
+      if (upper_ - lower_ < last || near_ > near_before) idle = 0;
       last = upper_ - lower_;
+      near_before = std::max(near_, near_before);
       const std::array<short, 3> corners = hull_.face(near).vertex;
       if (idle > kMostIdle || corners == asked) {  // a face that outlives its own support never goes
         stalled_ = true;
         return;
       }
       asked = corners;
+      if (lower_caps_) {
+        lower_caps();
+        continue;
+      }
       const int v = query(direction_to_ask_, closest_of(hull_.face(near), direction_to_ask_));
       if (v < 0 || upper_ - lower_ <= tolerance_) return;
       if (hull_.grow(v, least_height(), near) != GrowingHull::Growth::grown) {
@@ -123,6 +155,7 @@ class Search {
     if (v == kHullVertices) return -1;
     const Vec3 on_b = pair_.direction_on_b(d);
     const double enough = kSupportShare * tolerance_;
+    witness_[v].cap = false;
     const Support sa = find_hull_support(*pair_.a, d, near < 0 ? nullptr : &witness_[near].on_a,
                                          enough / pair_.scale_a),
                   sb = find_hull_support(*pair_.b, on_b, near < 0 ? nullptr : &witness_[near].on_b,
@@ -144,6 +177,8 @@ class Search {
       lower_ = -p;
       direction_ = d;
       best_ = v;
+      for (int k = 0; k < caps_; ++k)
+        lower_caps_ |= (p - shrink_) * cap_[k].used < cap_[k].level * cap_[k].proven;
     }
     return v;
   }
@@ -205,8 +240,130 @@ class Search {
     for (int k = 0; k < minima_; ++k) known |= witness_[v].d.dot(minimum_[k]) > kOneMinimum;
     minimum_[minima_++] = witness_[v].d;
     if (!smooth || known) return false;
-    if (witness_[v].p + lower_ <= kSurroundAbove * std::abs(lower_)) surround(v);
+    if (witness_[v].p + lower_ <= kSurroundAbove * std::abs(lower_)) surround(v, cover(v));
     return true;
+  }
+
+  // Proves by second order that no direction near the minimum at point v has less than the least overlap
+  // seen, less kCapDepth of the tolerance, T; the angle up to which, or 0. The hull gets a point G = T / cos
+  // (angle) d: where d' . G is T or more, d' is in the cap, and proven; so that where the hull, G in it, has
+  // its nearest face at t <= T, every direction overlaps by t.
+  //
+  // Along a great circle from d let p be the cores' overlap and L = d(t) . g that of the cores' points at v:
+  // p - L >= 0 is at most e at d and p'' + p >= W_A + W_B less the cores' shrinking, m0 - rho t, by both
+  // bodies' Bends. What is convex and at most e above 0 is no less than m0 (1 - cos(t - t0)) with t0 <=
+  // sqrt(2 e / m0), and L >= y0 - s t - y0 t^2 / 2, so that with s' = s + sqrt(2 e m0)
+  //     p >= y0 - s' t + (m0 - y0) t^2 / 2 (1 - t^2 / 12) - rho t^3 / 6,
+  // the factor only where m0 > y0.
+  double cover(int v) {
+    const Witness w = witness_[v];
+    const Vec3 d = w.d, t = d.unitOrthogonal(), s = d.cross(t), g = hull_.point(v);
+    const double level = -lower_ - kCapDepth * tolerance_ - shrink_;
+    if (joggle_ > 0 || hull_.points() == kHullVertices || !(level > tolerance_)) return 0;
+    const Mat3 back = pair_.turn.transpose();
+    const Bend a = bend_of(*pair_.a, w.on_a, pair_.scale_a, d, t, s),
+               b = bend_of(*pair_.b, w.on_b, pair_.scale_b, -(back * d), back * t, back * s);
+    const double y0 = d.dot(g), slope = (g - y0 * d).norm() + kRoundoff * pair_.reach,
+                 over = std::max(0.0, w.p - shrink_ - y0) + roundoff();
+    double angle = 0;
+    for (double to = kWidestCap; to > kLeastCap; to *= kNextCap) {
+      double rate = 0;
+      const Mat2 turn = least_turn(a, to, &rate) + least_turn(b, to, &rate);
+      const double mean = 0.5 * turn.trace(),
+                   m = mean - std::hypot(0.5 * (turn(0, 0) - turn(1, 1)), turn(0, 1)) - shrink_;
+      if (!(m > 0)) continue;
+      const double rise = m > y0 ? (1 - to * to / 12) : 1, falls = slope + std::sqrt(2 * over * m),
+                   bend = 0.5 * rise * (m - y0) - rate * to / 6, room = y0 - level;
+      if (!(room > 0)) break;
+      const bool stays = bend > 0 && falls * falls <= 4 * bend * room;
+      if (!stays && !(room - falls * to + std::min(0.0, bend) * to * to >= 0)) continue;
+      angle = to;
+      break;
+    }
+    if (!(angle > 0)) return 0;
+    Cap cap{d, level, std::cos(angle), std::cos(kCapUsed * angle), slope, hull_.points(), v};
+    hull_.store(level / cap.used * d);
+    witness_[cap.vertex] = w;
+    witness_[cap.vertex].cap = true;
+    cap_[caps_++] = cap;
+    if (hull_.faces() > 0) hull_.grow(cap.vertex, least_height());
+    return kCapUsed * angle;
+  }
+
+  // Of a body in its own axes, lengths of the lab.
+  static Bend bend_of(const Shape& shape, const SurfacePoint& at, double scale, const Vec3& d, const Vec3& t,
+                      const Vec3& s) {
+    Bend bend;
+    if (shape.dented() || shape.joint_slack > 0) return bend;
+    const InnerMap& map = shape.inner_map();
+    if (!map.nodes.empty()) {
+      const InnerNode& node = map.nodes[shape.atlas.nearest(d)];
+      const double off = angle_between(node.normal, d);
+      for (std::size_t k = 0; k < kInnerCaps.size(); ++k) {
+        bend.ball[k] = scale * node.radius[k];
+        bend.within[k] = kInnerCaps[k] - off - kOffNormal;
+      }
+      const int cell = InnerMap::cell(d);
+      const double beside = angle_between(InnerMap::middle(cell), d);
+      for (std::size_t k = 0; k < kStretchCaps.size(); ++k) {
+        bend.stretch[k] = scale * map.stretches[cell].least[k];
+        bend.near[k] = kStretchCaps[k] - beside - kOffNormal;
+      }
+    }
+    const LocalRate local = local_rate(shape, scale, at);
+    JetLanes jet;
+    evaluate2(shape.patches[at.patch], at.u, at.v, &jet);
+    nurbs::scale(scale, &jet);
+    SupportModel model;
+    if (!make_support_model(Mat3::Identity(), Vec3::Zero(), jet, local, &model)) return bend;
+    const Vec3 n = vec(model.normal), along = vec(model.tangent), across = n.cross(along);
+    if (!((n - d).squaredNorm() <= kOffNormal * kOffNormal)) return bend;
+    const Vec2 x(t.dot(along), s.dot(along)), y(t.dot(across), s.dot(across));
+    const Mat2 mixed = x * y.transpose();
+    bend.turn =
+        model.w0 * x * x.transpose() + model.w1 * (mixed + mixed.transpose()) + model.w2 * y * y.transpose();
+    const double mean = 0.5 * bend.turn.trace(),
+                 spread = std::hypot(0.5 * (bend.turn(0, 0) - bend.turn(1, 1)), bend.turn(0, 1));
+    bend.rate = local.rate;
+    bend.most = mean + spread;
+    // What the frames' and the normal's errors may hide.
+    bend.least = mean - spread - kOffNormal * (bend.most + bend.rate);
+    bend.turn -= kOffNormal * (bend.most + bend.rate) * Mat2::Identity();
+    // The point goes no further than most t + rate t^2 / 2.
+    bend.reach = local.room / (bend.most + std::sqrt(bend.most * bend.most + 2 * bend.rate * local.room)) *
+                 2 * (1 - kOffNormal);
+    return bend;
+  }
+
+  // A lower bound of W at d, less `rate` times the angle, for directions within `to` of it.
+  static Mat2 least_turn(const Bend& bend, double to, double* rate) {
+    double ball = 0;
+    for (std::size_t k = 0; k < kInnerCaps.size(); ++k)
+      if (to <= bend.within[k]) ball = std::max(ball, bend.ball[k]);
+    for (std::size_t k = 0; k < kStretchCaps.size(); ++k)
+      if (to <= bend.near[k]) ball = std::max(ball, bend.stretch[k]);
+    if (to <= bend.reach && bend.least - bend.rate * to > ball) {
+      *rate += bend.rate;
+      return bend.turn;
+    }
+    return ball * Mat2::Identity();
+  }
+
+  // A lower minimum was found: caps are proven for its level too, but the hull's points are those of the old
+  // one. Where it is none of overlapping cores, the caps go: their points become their minima's own.
+  void lower_caps() {
+    lower_caps_ = false;
+    const double level = -lower_ - kCapDepth * tolerance_ - shrink_;
+    for (int k = 0; k < caps_; ++k) {
+      Cap& cap = cap_[k];
+      cap.level = std::min(cap.level, level);
+      const bool serves = level > tolerance_;
+      hull_.move(cap.vertex, serves ? Vec3(cap.level / cap.used * cap.d) : hull_.point(cap.from));
+      witness_[cap.vertex].cap = serves;
+    }
+    if (!(level > tolerance_)) caps_ = 0;
+    Vec3 across;
+    if (!start_from_points(0, &across)) stalled_ = true;
   }
 
   // Newton on p(d): its gradient is the support pair's offset in the tangent plane, its Hessian W_A + W_B -
@@ -244,10 +401,12 @@ class Search {
   // Where p(d) is least in a crease, two supports u and v are level (a cone's tip and its rim): Newton on p
   // along the crease, with the weights that leave no slope across it. Bends of a share of each support's.
   void balance(const std::array<short, 3>& corners, int v) {
-    int u = corners[0];
+    int u = v;
     for (const short k : corners)
-      if ((hull_.point(k) - hull_.point(v)).squaredNorm() > (hull_.point(u) - hull_.point(v)).squaredNorm())
+      if (!witness_[k].cap &&
+          (hull_.point(k) - hull_.point(v)).squaredNorm() > (hull_.point(u) - hull_.point(v)).squaredNorm())
         u = k;
+    if (u == v) return;
     Vec3 d = witness_[v].d;
     for (int k = 0; k < kBalanceSteps; ++k) {
       const Vec3 gu = hull_.point(u), gv = hull_.point(v), apart = gu - gv;
@@ -285,7 +444,7 @@ class Search {
   // of a ring of normals n lie x . W^-1 x / 2 below d's plane; with them the hull reaches as far as d's along
   // every direction up to w / delta times the ring's (w: least eigenvalue of W, delta: depth). Rings that far
   // apart leave the search little else to find.
-  void surround(int from) {
+  void surround(int from, double covered) {
     const double depth = -(lower_ + shrink_);
     if (!(depth > 0)) return;
     const Vec3 d = witness_[from].d, t = d.unitOrthogonal(), s = d.cross(t);
@@ -299,7 +458,10 @@ class Search {
     const double ratio = std::clamp(kRingShare * least / depth, kLeastRing, kMostRing);
     double phase = 0;
     // r: root of twice the drop.
-    for (double r = std::sqrt(tolerance_); r < kWidestRing * std::sqrt(most); r *= ratio) {
+    const double widest = kWidestRing * std::sqrt(most);
+    double r = std::sqrt(tolerance_);
+    while (r < covered * std::sqrt(least) && r * ratio < widest) r *= ratio;
+    for (; r < widest; r *= ratio) {
       for (int k = 0; k < 4; ++k) {
         const double x = r * std::cos(phase + 0.5 * M_PI * k) / std::sqrt(most),
                      y = r * std::sin(phase + 0.5 * M_PI * k) / std::sqrt(least);
@@ -324,7 +486,15 @@ class Search {
     if (near.face < 0) return -1;
     const GrowingHull::Face& f = hull_.face(near.face);
     const double distance = std::sqrt(near.distance2);
-    upper_ = std::min(upper_, (near.inside ? -distance : distance) - shrink_ + roundoff());
+    near_ = near.inside ? distance : -distance;
+    double below = near.inside ? distance : caps_ > 0 ? -kFarAway : -distance;
+    for (int k = 0; k < caps_; ++k) {
+      const Cap& c = cap_[k];
+      // Else the hull gives away directions that are not proven, but along which d's points overlap.
+      const bool proven = distance * c.used >= c.level * c.proven;
+      below = std::min(below, proven ? c.level : c.used * distance - c.slope);
+    }
+    upper_ = std::min(upper_, -below - shrink_ + roundoff());
     const Vec3 closest = hull_.nearest_point(f);
     const bool plane = !f.sliver && (near.inside || f.weights.minCoeff() > 0 || !(distance > roundoff()));
     if (plane)
@@ -388,10 +558,12 @@ class Search {
   const PairFrame& pair_;
   double tolerance_, joggle_;
   double shrink_a_, shrink_b_, shrink_;
-  double lower_ = -kFarAway, upper_ = kFarAway;
+  double lower_ = -kFarAway, upper_ = kFarAway, near_ = -kFarAway;
   Vec3 direction_ = Vec3::UnitX(), direction_to_ask_ = Vec3::UnitX();
   int best_ = 0, queries_ = 0, balances_ = 0, minima_ = 0;
-  bool stalled_ = false;
+  bool stalled_ = false, lower_caps_ = false;
+  int caps_ = 0;
+  Cap cap_[kMostMinima];
   Vec3 minimum_[kMostMinima];  // directions surrounded
   Witness witness_[kHullVertices];
   GrowingHull hull_;

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <utility>
+#include <vector>
 
 #include "contact/pair_search.h"
 #include "support/deep_fuzz.h"
@@ -32,15 +33,47 @@ TEST(DeepFuzz, a_sample_of_every_pose) {
     }
 }
 
-// Two bodies of revolution on nearly one axis that part sideways: a ring of directions is as good to within
-// the tolerance or little more, and the minimum in it turns with the tilt.
-TEST(DeepFuzz, nearly_coaxial_bodies_that_part_sideways) {
-  const std::pair<Pose, long> once[] = {{Pose::coaxial, 33}, {Pose::centred, 106}, {Pose::centred, 182}};
-  for (const auto& [pose, k] : once) {
+void expect_right(const std::vector<std::pair<Pose, long>>& pairs) {
+  for (const auto& [pose, k] : pairs) {
     const Judgement j = answer(pose, k, true);
     EXPECT_STREQ(j.wrong, "") << kPoseNames[static_cast<int>(pose)] << " " << k << ": " << j.error << " of "
                               << j.allowed;
   }
+}
+
+// A sphere's part whose centre is on the mate's axis, on its edge or in a plane of its symmetry: a ring of
+// directions is exactly as good, and a ball a little smaller than the sphere would not tell.
+TEST(DeepFuzz, spheres_about_a_point_of_the_mates_axis) {
+  expect_right({{Pose::deep, 271},
+                {Pose::deep, 2533},
+                {Pose::deep, 5288},
+                {Pose::deep, 6151},
+                {Pose::deep, 7451},
+                {Pose::deep, 7577},
+                {Pose::deep, 9586},
+                {Pose::features, 2480},
+                {Pose::features, 9649},
+                {Pose::features, 10520},
+                {Pose::sizes, 998},
+                {Pose::sizes, 7391},
+                {Pose::sizes, 11261}});
+}
+
+// Contact on a flat within a millionth of its pole, where normals are mostly round-off: certified, and wrong
+// by the flat's radius times that.
+TEST(DeepFuzz, flats_touched_beside_their_pole) {
+  expect_right({{Pose::coaxial, 1389}, {Pose::coaxial, 4203}});
+}
+
+// A blunt pole in a cone a hundred thousand times as large.
+TEST(DeepFuzz, a_pole_in_a_wide_tip) {
+  expect_right({{Pose::sizes, 4969}});
+}
+
+// Two bodies of revolution on nearly one axis that part sideways: a ring of directions is as good to within
+// the tolerance or little more, and the minimum in it turns with the tilt.
+TEST(DeepFuzz, nearly_coaxial_bodies_that_part_sideways) {
+  expect_right({{Pose::coaxial, 33}, {Pose::centred, 106}, {Pose::centred, 182}});
 }
 
 // The judge sees what it is there for.

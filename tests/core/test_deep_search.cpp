@@ -166,6 +166,33 @@ TEST(DeepSearch, no_direction_overlaps_by_less_than_is_proven) {
   EXPECT_GT(proven, tried / 2);
 }
 
+// Bodies with flats, poles, creases: what the polytope's caps about minima prove, too.
+TEST(Polytope, no_direction_overlaps_by_less_than_is_proven) {
+  Random random(76);
+  const ShapePointer shapes[] = {disc(),
+                                 polar(),
+                                 smooth_pebble(),
+                                 slender(),
+                                 cuboid(),
+                                 make_shape("tablet", tablet(1, 0.6, 0.2)),
+                                 make_shape("egg", egg(0.7, 0.5, 1.2)),
+                                 make_shape("biconvex", biconvex_tablet(1, 0.3, 1.6, 0.1))};
+  int proven = 0;
+  for (int k = 0; k < 400; ++k) {
+    const Pair p = deep_pair(*shapes[random.below(8)], *shapes[random.below(8)], random);
+    const PairFrame pair(p.a, p.b);
+    const PolytopeResult hull = solve_polytope(pair, Vec3::Zero(), 1e-9 * pair.size, kFarAway);
+    proven += hull.converged;
+    const double least = -hull.bracket.upper, noise = 1e-13 * pair.reach;
+    const Vec3 d = hull.bracket.direction;
+    const auto overlap = [&](const Vec3& n) { return overlap_along(p.a, p.b, pair.axes_a * n); };
+    for (int i = 0; i < 300; ++i) ASSERT_GE(overlap(random.direction()), least - noise) << k;
+    for (int i = 0; i < 300; ++i)
+      ASSERT_GE(overlap(near(d, random.log_uniform(1e-5, 0.5), random)), least - noise) << k;
+  }
+  EXPECT_GT(proven, 390);
+}
+
 TEST(DeepSearch, a_local_minimum_is_not_taken_for_the_least) {
   // Along the disc's rim the overlap has a local minimum; across it, a far lesser one.
   Random random(74);
