@@ -4,12 +4,14 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <limits>
 
 #include "contact/pair_search.h"
 #include "nurbs/tolerances.h"
 #include "shapes/primitives.h"
 #include "shapes/random_pebble.h"
 #include "shapes/revolved.h"
+#include "shapes/rounded_polyhedron.h"
 #include "support/as_surface.h"
 #include "support/solid_families.h"
 
@@ -149,6 +151,31 @@ std::vector<Actor> make_actors() {
   surface.name = "disc, as a surface";
   surface.solid.shape = test::as_surface(*surface.solid.shape);
   actors.push_back(surface);
+  const double rounding = 0.15;
+  std::vector<Vec3> octahedron;
+  for (const HalfSpace& face : platonic_solid("octahedron", 1)) octahedron.push_back(face.normal);
+  actors.push_back(closed_form(
+      "rounded octahedron", rounded_polyhedron(platonic_solid("octahedron", 1), Vec3::Zero(), rounding),
+      [rounding](const Vec3& d) -> Vec3 {
+        int k = 0;
+        d.cwiseAbs().maxCoeff(&k);
+        return (1 - std::sqrt(3.0) * rounding) * (d[k] < 0 ? -1 : 1) * Vec3::Unit(k) +
+               rounding * d.normalized();
+      },
+      octahedron));
+  actors.push_back(closed_form(
+      "egg", egg(0.7, 0.5, 1.2),
+      [](const Vec3& d) {
+        return test::ellipsoid_support(d, {0.7, 0.7, d[2] > 0 ? 1.2 : 0.5});
+      },
+      ends));
+  for (const double polar : {0.2, 3.0})  // one patch
+    actors.push_back(closed_form(
+        "polar " + std::to_string(polar).substr(0, 3), revolved_ellipsoid(1, polar),
+        [polar](const Vec3& d) {
+          return test::ellipsoid_support(d, {1, 1, polar});
+        },
+        ends));
   actors.push_back(sampled("pebble", pebble(), 20));
   actors.push_back(sampled("grain", random_pebble(5, PebbleForm()), 20));
   actors.push_back(sampled("blocky 4", fitted_superellipsoid({1, 0.9, 0.8}, 4, 3), 50));
