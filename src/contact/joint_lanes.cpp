@@ -71,7 +71,7 @@ NURBS_INLINE Sides look(unsigned open, const Shape* const (&shape)[kWidth], cons
   Sides out;
   const V su = own(JetLanes::kSu), sv = own(JetLanes::kSv);
   const Wide lu = norm2(su), lv = norm2(sv);
-  constexpr double kLost = kPoleNormal * kPoleNormal;
+  constexpr double kLost = kNearPole * kNearPole;  // nearer, round-off counts in the certificate
   out.plain = (lu >= kLost * lv) & (lv >= kLost * lu);
   const V n = normalized(cross(su, sv));
   out.inner = out.outer = out.slack = out.near = Wide{};
