@@ -140,6 +140,25 @@ double ratio_between(const std::vector<BezierPatch>& patches, const Edge& a, con
   return s / (1 - s);
 }
 
+// The same from the weights at the ends, exactly: in t / (1 - t) a map of that form multiplies the k-th
+// weight by ratio^k. 1 where the degrees differ.
+double ratio_of_weights(const std::vector<BezierPatch>& patches, const Edge& a, const Edge& b,
+                        bool reversed) {
+  const auto weights = [&](const Edge& e, double(&end)[2]) {
+    const BezierPatch& patch = patches[e.patch];
+    for (int k = 0; k < 2; ++k) {
+      const Vec2 at = edge_parameters(e.edge, k);
+      end[k] = patch.point(at[0] > 0.5 ? patch.degree_u : 0, at[1] > 0.5 ? patch.degree_v : 0)[3];
+    }
+    return e.edge < 2 ? patch.degree_v : patch.degree_u;
+  };
+  double of_a[2], of_b[2];
+  const int degree = weights(a, of_a);
+  if (weights(b, of_b) != degree) return 1;
+  if (reversed) std::swap(of_a[0], of_a[1]);
+  return std::pow((of_a[1] / of_a[0]) / (of_b[1] / of_b[0]), 1.0 / degree);
+}
+
 void add_candidates(const std::vector<BezierPatch>& patches, const std::vector<Edge>& edges, int first,
                     int second, double tolerance, std::vector<Candidate>& out) {
   const Edge &a = edges[std::min(first, second)], &b = edges[std::max(first, second)];
@@ -151,10 +170,12 @@ void add_candidates(const std::vector<BezierPatch>& patches, const std::vector<E
     };
     c.gap = gap(c);
     if (c.gap > kSameParameters * tolerance) {  // more than rounded digits: other parameters may fit better
-      Candidate other = c;
-      other.ratio = ratio_between(patches, a, b);
-      other.gap = gap(other);
-      if (other.gap < 0.5 * c.gap) c = other;
+      for (const double ratio : {ratio_of_weights(patches, a, b, reversed), ratio_between(patches, a, b)}) {
+        Candidate other = c;
+        other.ratio = ratio;
+        other.gap = gap(other);
+        if (other.gap < 0.5 * c.gap) c = other;
+      }
     }
     const bool closed = (a.at.front() - a.at.back()).norm() <= tolerance;
     if (c.gap > tolerance && !closed && curve_gap(patches, a, b) <= tolerance) {
@@ -239,6 +260,15 @@ void add_groove(double angle, const LocalForm& a, const LocalForm& b, int p, int
   worst.deepest = {p, a.u, a.v};
 }
 
+// Of the edge, not of a parameter line beside it, which weights may slant any way; where the edge has none
+// (an end at a pole), of the form nearby.
+Vec3 edge_tangent(const BezierPatch& patch, int edge, const Vec2& at, const LocalForm& near) {
+  const Jet1 jet = evaluate1(patch, at[0], at[1]);
+  const Vec3 own = edge < 2 ? jet.sv : jet.su, beside = edge < 2 ? near.sv : near.su;
+  const double length = (edge_point(patch, edge, 1) - edge_point(patch, edge, 0)).norm();
+  return own.norm() > kNoDirection * length ? own : beside;
+}
+
 double edge_kink(const std::vector<BezierPatch>& patches, int p, int e, const EdgeLink& link,
                  KinkSummary& worst) {
   double kink = 0;
@@ -256,7 +286,7 @@ double edge_kink(const std::vector<BezierPatch>& patches, int p, int e, const Ed
     const Vec2 there = edge_parameters(link.edge, s);
     const LocalForm b = local_form(patches[link.patch], there[0], there[1]);
     if (end && (b.u != there[0] || b.v != there[1])) continue;
-    const Vec3 along = (forward ? 1.0 : -1.0) * (e < 2 ? a.sv : a.su);
+    const Vec3 along = (forward ? 1.0 : -1.0) * edge_tangent(patches[p], e, at, a);
     const double angle = signed_angle(a.normal, b.normal, along);
     if (angle < 0) add_groove(-angle, a, b, p, e, along.cross(a.normal), worst);
     worst.convex = std::max(worst.convex, angle);

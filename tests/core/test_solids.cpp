@@ -85,6 +85,25 @@ void tumble_on_plane(const Solid& solid, Random& random, int steps) {
   }
 }
 
+// Weights slant parameter lines, make speeds differ by their ratio's square and crowd an edge's points at its
+// ends: bodies all the same, joined, and with the right supports.
+TEST(Solids, weights_of_any_size_are_loaded) {
+  for (int k = 0; k < 60; ++k) {
+    Random random(1001 + 2 * k);
+    const int points = random.whole(4, 9);
+    const double squeeze = random.log_uniform(0.05, 1);
+    SCOPED_TRACE(k);
+    Solid solid;
+    ASSERT_NO_THROW(solid = test::polyhedron(random, points, squeeze, 1e3));
+    for (int j = 0; j < 20; ++j) {
+      const Vec3 d = random.direction();
+      const Support s = find_hull_support(*solid.shape, d);
+      EXPECT_NEAR(s.h, d.dot(solid.support(d)), 1e-13 * solid.shape->bounding_radius);
+      EXPECT_LE(s.upper - s.h, 1e-13 * solid.shape->bounding_radius);
+    }
+  }
+}
+
 TEST(Solids, planes_are_right_over_warm_sequences) {
   for (int kind = 0; kind < kKinds; ++kind) {
     Random random(50 + kind);
