@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "scene/contact_stages.h"
+#include "support/host_bodies.h"
 #include "support/pairs.h"
 
 namespace nurbs::bench {
@@ -21,9 +22,7 @@ class StagedPairs {
 
  private:
   const std::vector<std::vector<test::Pair>>& paths_;
-  std::vector<const Shape*> shapes_;
-  std::vector<double> x_, zeros_, q_, ones_, scale_, radius_;
-  std::vector<int> shape_, mask_;
+  test::HostBodies held_;
   std::vector<PairProof> proofs_;
   ContactCoefficients law_{1e3, 8e2, 0.1, 0.1, 0.4};
   Bodies bodies_;

@@ -130,6 +130,14 @@ SquaredDistance squared_distance(const BezierPatch& patch, double less) {
   return f;
 }
 
+double bound_off_unit_sphere(const BezierPatch& patch) {
+  const SquaredDistance square = squared_distance(patch, 1);
+  double most = 0;
+  for (size_t k = 0; k < square.num.size(); ++k)
+    most = std::max(most, std::abs(square.num[k]) / square.den[k]);
+  return most;
+}
+
 RadiusBounds bound_radius(const std::vector<BezierPatch>& patches) {
   RadiusBounds bounds;
   bounds.outer = std::sqrt(std::max(0.0, bound_squared(patches, 1)));

@@ -14,6 +14,8 @@ struct SquaredDistance {
   std::vector<double> num, den;
 };
 SquaredDistance squared_distance(const BezierPatch& patch, double less = 0);
+// ||x|^2 - 1| is at most this on a patch.
+double bound_off_unit_sphere(const BezierPatch& patch);
 
 struct RadiusBounds {
   double inner = 0;  // no surface point is nearer to the origin

@@ -70,11 +70,7 @@ void improve(const std::vector<BezierPatch>& patches, Ellipsoid* e) {
 // Bound of ||y|^2 - 1| over the patch, y as above.
 double off_ball(BezierPatch patch, const Ellipsoid& e) {
   for (Vec4& p : patch.points) p.head<3>() = to_ball(e, p.head<3>());
-  const SquaredDistance square = squared_distance(patch, 1);
-  double most = 0;
-  for (size_t k = 0; k < square.num.size(); ++k)
-    most = std::max(most, std::abs(square.num[k]) / square.den[k]);
-  return most;
+  return bound_off_unit_sphere(patch);
 }
 
 }  // namespace

@@ -6,8 +6,8 @@
 #include <cstring>
 
 #include "nurbs/bernstein.h"
-#include "nurbs/lanes.h"
 #include "nurbs/tolerances.h"
+#include "nurbs/wide.h"
 
 namespace nurbs {
 namespace {
@@ -54,12 +54,6 @@ struct Rows {
   }
   NURBS_INLINE void store(double* c) const { std::memcpy(c, r, sizeof r); }
 };
-NURBS_INLINE Lane4 lesser(const Lane4& a, const Lane4& b) {
-  return a < b ? a : b;
-}
-NURBS_INLINE Lane4 greater(const Lane4& a, const Lane4& b) {
-  return a > b ? a : b;
-}
 NURBS_INLINE double highest(const Lane4& a) {
   return std::max(std::max(a[0], a[1]), std::max(a[2], a[3]));
 }
@@ -218,16 +212,16 @@ void difference_bicubic(const double* g, Bounds* b) {
   }
   const Lane4 mixed[3] = {v[1] - v[0], v[2] - v[1], v[3] - v[2]};
   const auto least = [](const Lane4& p, const Lane4& q, const Lane4& r, const Lane4& s) {
-    return lesser(lesser(p, q), lesser(r, s));
+    return smaller(smaller(p, q), smaller(r, s));
   };
   const auto most = [](const Lane4& p, const Lane4& q, const Lane4& r, const Lane4& s) {
-    return greater(greater(p, q), greater(r, s));
+    return larger(larger(p, q), larger(r, s));
   };
   Lane4 low[4], high[4];
-  transpose({least(u[0], u[1], u[2], u[2]), least(v[0], v[1], v[2], v[3]), lesser(uu[0], uu[1]),
+  transpose({least(u[0], u[1], u[2], u[2]), least(v[0], v[1], v[2], v[3]), smaller(uu[0], uu[1]),
              least(vv[0], vv[1], vv[2], vv[3])},
             low);
-  transpose({most(u[0], u[1], u[2], u[2]), most(v[0], v[1], v[2], v[3]), greater(uu[0], uu[1]),
+  transpose({most(u[0], u[1], u[2], u[2]), most(v[0], v[1], v[2], v[3]), larger(uu[0], uu[1]),
              most(vv[0], vv[1], vv[2], vv[3])},
             high);
   const Lane4 lows = least(low[0], low[1], low[2], low[3]), highs = most(high[0], high[1], high[2], high[3]);
@@ -236,8 +230,8 @@ void difference_bicubic(const double* g, Bounds* b) {
   b->guu = {lows[2], highs[2]};
   b->gvv = {lows[3], highs[3]};
   const Lane4 zero{0, 0, 0, 0};
-  b->guv = {-highest(greater(zero - mixed[0], greater(zero - mixed[1], zero - mixed[2]))),
-            highest(greater(mixed[0], greater(mixed[1], mixed[2])))};
+  b->guv = {-highest(larger<Lane4>(zero - mixed[0], larger<Lane4>(zero - mixed[1], zero - mixed[2]))),
+            highest(larger(mixed[0], larger(mixed[1], mixed[2])))};
 }
 
 class Search {
@@ -319,7 +313,7 @@ class Search {
       const Rows w(box.rational ? box.w : box.f);
       for (int i = 0; i < 4; ++i) c.r[i] -= box.rational ? Lane4(level * w.r[i]) : Lane4{} + level;
       c.store(g);
-      return highest(greater(greater(c.r[0], c.r[1]), greater(c.r[2], c.r[3]))) > 0;
+      return highest(larger(larger(c.r[0], c.r[1]), larger(c.r[2], c.r[3]))) > 0;
     }
     double most = -kFarAway;
     const int n = box.size();

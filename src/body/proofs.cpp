@@ -129,13 +129,14 @@ std::vector<std::string> describe_proofs(const Shape& shape) {
   lines.push_back(format("proven: curvature radii from %.4g to %.4g (%.4g to %.4g occur), %d cells",
                          radii.min_radius, radii.max_radius, p.sphere ? radii.min_radius : p.seen_min,
                          p.sphere ? radii.max_radius : p.seen_max, p.cells));
-  if (p.rate > 0 && !p.sphere && p.seen_rate <= p.rate)
+  if (p.rate > 0 && !p.sphere)
     lines.push_back(
-        format("proven: they change by at most %.3g a radian (%.3g occurs)", p.rate, p.seen_rate));
-  if (p.rate > 0 && !p.sphere && p.seen_rate > p.rate)
-    lines.push_back(format(
-        "proven: but for places that have no bound they change by at most %.3g a radian (there, by %.3g)",
-        p.rate, p.seen_rate));
+        p.seen_rate <= p.rate
+            ? format("proven: they change by at most %.3g a radian (%.3g occurs)", p.rate, p.seen_rate)
+            : format(
+                  "proven: but for places that have no bound they change by at most %.3g a radian (there, by "
+                  "%.3g)",
+                  p.rate, p.seen_rate));
   lines.push_back(format("proven: joints gape by at most %.2g, open by %.3g and close by %.3g degrees",
                          p.joint_gap, p.opening * 180 / M_PI, p.closing * 180 / M_PI));
   const bool none = proven_without_dents(shape);

@@ -39,11 +39,7 @@ bool is_plane(const BezierPatch& patch, const Sample& s, double size) {
 // How far |map (x - centre)|^2 is from 1, at most.
 double off_unit(BezierPatch patch, const Vec3& centre, const Mat3& map) {
   for (Vec4& p : patch.points) p.head<3>() = map * (p.head<3>() - p[3] * centre);
-  const SquaredDistance square = squared_distance(patch, 1);
-  double most = 0;
-  for (std::size_t k = 0; k < square.num.size(); ++k)
-    most = std::max(most, std::abs(square.num[k]) / square.den[k]);
-  return most;
+  return bound_off_unit_sphere(patch);
 }
 
 double radius_of(const BezierPatch& patch) {

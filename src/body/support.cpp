@@ -231,6 +231,17 @@ double crease_excess(const Shape& shape, const Vec3& d, const SurfacePoint& at, 
   return kFanSafety * 0.5 * radius * chord * chord + link.gap;
 }
 
+// Sets where a support is, its height along d and its normal; the normal's error with it.
+Normal set_point(const Shape& shape, const Vec3& d, const SurfacePoint& at, const Vec3& x, const Vec3& su,
+                 const Vec3& sv, Support* s) {
+  const Normal normal = normal_at(shape, su, sv);
+  s->where = at;
+  s->point = x;
+  s->normal = std::isfinite(normal.noise) ? normal.n : d;
+  s->h = d.dot(x);
+  return normal;
+}
+
 // Ascent from `at` to a local maximum of d . s.
 Support climb(const Shape& shape, const Vec3& d, SurfacePoint at) {
   Support best;
@@ -286,12 +297,8 @@ Support climb(const Shape& shape, const Vec3& d, SurfacePoint at) {
       break;
     }
   }
-  best.where = at;
   best.slope = slope;
-  best.point = jet.s;
-  best.h = f;
-  const Normal normal = normal_at(shape, jet.su, jet.sv);
-  best.normal = std::isfinite(normal.noise) ? normal.n : d;
+  const Normal normal = set_point(shape, d, at, jet.s, jet.su, jet.sv, &best);
   double excess = excess_at(shape, d, at, normal);
   if (excess > kRoundoff * size) excess = std::min(excess, crease_excess(shape, d, at, jet));
   best.upper = f + excess + kRoundoff * size;
@@ -308,12 +315,8 @@ Support search_patches(const Shape& shape, const Vec3& d, const Support& low) {
       raise(shape.patches[p], static_cast<int>(p), d, slack, &top);
   }
   Support s;
-  s.where = top.where;
   const Jet1 jet = evaluate1(shape.patches[top.where.patch], top.where.u, top.where.v);
-  const Normal normal = normal_at(shape, jet.su, jet.sv);
-  s.normal = std::isfinite(normal.noise) ? normal.n : d;
-  s.point = jet.s;
-  s.h = d.dot(s.point);
+  set_point(shape, d, top.where, jet.s, jet.su, jet.sv, &s);
   s.upper = std::max(top.upper, s.h);
   s.slope = 0;
   s.iterations = low.iterations + top.boxes;
@@ -357,12 +360,8 @@ Support find_hull_support(const Shape& shape, const Vec3& d, const SurfacePoint*
 
 Support confirm_support(const Shape& shape, const Vec3& d, const SurfacePoint& at) {
   const Jet1 jet = evaluate1(shape.patches[at.patch], at.u, at.v);
-  const Normal normal = normal_at(shape, jet.su, jet.sv);
   Support s;
-  s.where = at;
-  s.point = jet.s;
-  s.normal = std::isfinite(normal.noise) ? normal.n : d;
-  s.h = d.dot(jet.s);
+  const Normal normal = set_point(shape, d, at, jet.s, jet.su, jet.sv, &s);
   s.upper = s.h + excess_at(shape, d, at, normal) + kRoundoff * shape.bounding_radius;
   s.converged = true;
   return is_certain(shape, s, 0) ? s : search_patches(shape, d, s);

@@ -10,19 +10,6 @@ namespace {
 
 using V = Triple<Wide>;
 
-NURBS_INLINE Vec3 lane(const V& v, int l) {
-  return {v.x[l], v.y[l], v.z[l]};
-}
-NURBS_INLINE WideMask mask_of(unsigned bits) {
-  WideMask m;
-  for (int l = 0; l < kWidth; ++l) m[l] = bits >> l & 1 ? -1 : 0;
-  return m;
-}
-NURBS_INLINE unsigned bits_of(const WideMask& m) {
-  unsigned bits = 0;
-  for (int l = 0; l < kWidth; ++l) bits |= (m[l] != 0) << l;
-  return bits;
-}
 NURBS_INLINE Wide norm2(const V& v) {
   return dot(v, v);
 }

@@ -32,6 +32,15 @@ struct Cap {
   int vertex, from;     // the minimum's own
 };
 
+// Eigenvalues of a symmetric matrix.
+struct Extremes {
+  double least, most;
+};
+Extremes extremes(const Mat2& m) {
+  const double mean = 0.5 * m.trace(), spread = std::hypot(0.5 * (m(0, 0) - m(1, 1)), m(0, 1));
+  return {mean - spread, mean + spread};
+}
+
 // What is known of a body's inverse Weingarten maps W about a direction d: the support's, in a frame of d's
 // tangent plane, less `rate` times the angle from d up to `reach`, and balls.
 struct Bend {
@@ -269,8 +278,7 @@ class Search {
     for (double to = kWidestCap; to > kLeastCap; to *= kNextCap) {
       double rate = 0;
       const Mat2 turn = least_turn(a, to, &rate) + least_turn(b, to, &rate);
-      const double mean = 0.5 * turn.trace(),
-                   m = mean - std::hypot(0.5 * (turn(0, 0) - turn(1, 1)), turn(0, 1)) - shrink_;
+      const double m = extremes(turn).least - shrink_;
       if (!(m > 0)) continue;
       const double rise = m > y0 ? (1 - to * to / 12) : 1, falls = slope + std::sqrt(2 * over * m),
                    bend = 0.5 * rise * (m - y0) - rate * to / 6, room = y0 - level;
@@ -322,12 +330,11 @@ class Search {
     const Mat2 mixed = x * y.transpose();
     bend.turn =
         model.w0 * x * x.transpose() + model.w1 * (mixed + mixed.transpose()) + model.w2 * y * y.transpose();
-    const double mean = 0.5 * bend.turn.trace(),
-                 spread = std::hypot(0.5 * (bend.turn(0, 0) - bend.turn(1, 1)), bend.turn(0, 1));
+    const Extremes seen = extremes(bend.turn);
     bend.rate = local.rate;
-    bend.most = mean + spread;
+    bend.most = seen.most;
     // What the frames' and the normal's errors may hide.
-    bend.least = mean - spread - kOffNormal * (bend.most + bend.rate);
+    bend.least = seen.least - kOffNormal * (bend.most + bend.rate);
     bend.turn -= kOffNormal * (bend.most + bend.rate) * Mat2::Identity();
     // The point goes no further than most t + rate t^2 / 2.
     bend.reach = local.room / (bend.most + std::sqrt(bend.most * bend.most + 2 * bend.rate * local.room)) *
@@ -450,10 +457,9 @@ class Search {
     const Vec3 d = witness_[from].d, t = d.unitOrthogonal(), s = d.cross(t);
     Mat2 turn;
     if (!core_turn(from, d, t, s, &turn)) return;
-    const double mean = 0.5 * turn.trace(), half = 0.5 * (turn(0, 0) - turn(1, 1)),
-                 spread = std::hypot(half, turn(0, 1)), least = mean - spread, most = mean + spread;
+    const auto [least, most] = extremes(turn);
     if (!(least > kLeastSpread * depth)) return;
-    const double angle = 0.5 * std::atan2(turn(0, 1), half);
+    const double angle = 0.5 * std::atan2(turn(0, 1), 0.5 * (turn(0, 0) - turn(1, 1)));
     const Vec3 long_axis = std::cos(angle) * t + std::sin(angle) * s, short_axis = d.cross(long_axis);
     const double ratio = std::clamp(kRingShare * least / depth, kLeastRing, kMostRing);
     double phase = 0;

@@ -129,6 +129,26 @@ NURBS_INLINE Vec3 vec(const Triple<double>& v) {
   return {v.x, v.y, v.z};
 }
 
+// One lane's vector, in and out; masks as bits, one a lane.
+NURBS_INLINE Vec3 lane(const Triple<Wide>& v, int l) {
+  return {v.x[l], v.y[l], v.z[l]};
+}
+NURBS_INLINE void set_lane(const Triple<double>& from, int l, Triple<Wide>* to) {
+  to->x[l] = from.x;
+  to->y[l] = from.y;
+  to->z[l] = from.z;
+}
+NURBS_INLINE WideMask mask_of(unsigned bits) {
+  WideMask m;
+  for (int l = 0; l < kWidth; ++l) m[l] = bits >> l & 1 ? -1 : 0;
+  return m;
+}
+NURBS_INLINE unsigned bits_of(const WideMask& m) {
+  unsigned bits = 0;
+  for (int l = 0; l < kWidth; ++l) bits |= (m[l] != 0) << l;
+  return bits;
+}
+
 // A rotation matrix of either number, by rows.
 template <class Real>
 struct Turn {

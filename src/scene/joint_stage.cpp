@@ -23,6 +23,7 @@ bool goes_on(const ContactBlock& block, int lane) {
 void ContactStages::follow_surfaces(ContactBlock& block, int first, Results& results) const {
   if (step_.wall != nullptr || step_.settings.solver != Solver::ladder) return;
   JointLanes pairs;
+  PointMemory points[kWidth][2];
   unsigned asked = 0;
   const double *of_a[kWidth], *of_b[kWidth];
   for (int l = 0; l < kWidth; ++l) {
@@ -33,10 +34,9 @@ void ContactStages::follow_surfaces(ContactBlock& block, int first, Results& res
     const int a = block.a[lane], b = block.b[lane];
     const Particle pa = step_.bodies->particle(a), pb = step_.bodies->particle(b);
     if (pa.shape->ellipsoid.found && pb.shape->ellipsoid.found) continue;  // have a closed form
-    PointMemory on[2];
-    block.get(lane, kPoints, 10, on);
-    pairs.on_a[l] = warm_point(on[0], *pa.shape);
-    pairs.on_b[l] = warm_point(on[1], *pb.shape);
+    block.get(lane, kPoints, 10, points[l]);
+    pairs.on_a[l] = warm_point(points[l][0], *pa.shape);
+    pairs.on_b[l] = warm_point(points[l][1], *pb.shape);
     pairs.a[l] = pa.shape;
     pairs.b[l] = pb.shape;
     pairs.scale_a[l] = pa.scale;
@@ -56,8 +56,7 @@ void ContactStages::follow_surfaces(ContactBlock& block, int first, Results& res
   const unsigned found = follow_joints(asked, std::numeric_limits<double>::infinity(), &pairs);
   if (found == 0) return;
 
-  WideMask mask;
-  for (int l = 0; l < kWidth; ++l) mask[l] = found >> l & 1 ? -1 : 0;
+  const WideMask mask = mask_of(found);
   const Wide one = all<Wide>(1);
   put_lanes(mask, pairs.gap, first, results.gap);
   put_lanes(mask, pairs.lower, first, results.lower);
@@ -91,13 +90,11 @@ void ContactStages::follow_surfaces(ContactBlock& block, int first, Results& res
       block.set(lane, 0, kLocalModelSize, &model);
     else
       block.field[kUnique][lane] = model.unique;
-    PointMemory on[2];
-    block.get(lane, kPoints, 10, on);
-    remember_point(pairs.on_a[l], &on[0]);
-    remember_point(pairs.on_b[l], &on[1]);
-    block.set(lane, kPoints, 10, on);
-    set_proof({pairs.direction.x[l], pairs.direction.y[l], pairs.direction.z[l]}, pairs.lower[l],
-              {pairs.offset.x[l], pairs.offset.y[l], pairs.offset.z[l]}, pa.q, pb.q, &proof);
+    remember_point(pairs.on_a[l], &points[l][0]);
+    remember_point(pairs.on_b[l], &points[l][1]);
+    block.set(lane, kPoints, 10, points[l]);
+    set_proof(nurbs::lane(pairs.direction, l), pairs.lower[l], nurbs::lane(pairs.offset, l), pa.q, pb.q,
+              &proof);
   }
 }
 

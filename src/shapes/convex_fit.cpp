@@ -42,38 +42,8 @@ class Grid {
   std::vector<SmoothCube::Basis> table_;
 };
 
-struct Piece {
-  int face, a, b;
-  std::vector<int> columns;  // net indices of its control points
-};
-
-std::vector<Piece> make_pieces(const SmoothCube& cube) {
-  std::vector<Piece> pieces;
-  const int p = cube.degree();
-  for (int f = 0; f < kCubeFaces; ++f)
-    for (int a = 0; a < cube.spans(); ++a)
-      for (int b = 0; b < cube.spans(); ++b) {
-        Piece piece{f, a, b, {}};
-        for (int i = 0; i <= p; ++i)
-          for (int j = 0; j <= p; ++j) piece.columns.push_back(cube.index(f, a, b, i, j));
-        pieces.push_back(std::move(piece));
-      }
-  return pieces;
-}
-
-// What each control point of a piece adds to position and derivatives at one sample: columns x, u, v, uu, uv,
-// vv.
-using Shares = Eigen::Matrix<double, Eigen::Dynamic, 6>;
-
-Shares tensor(const SmoothCube::Basis& u, const SmoothCube::Basis& v, int degree) {
-  const int n = degree + 1;
-  Shares out(n * n, 6);
-  for (int i = 0; i < n; ++i)
-    for (int j = 0; j < n; ++j)
-      out.row(i * n + j) << u.value[i] * v.value[j], u.slope[i] * v.value[j], u.value[i] * v.slope[j],
-          u.bend[i] * v.value[j], u.slope[i] * v.slope[j], u.value[i] * v.bend[j];
-  return out;
-}
+using Piece = SmoothCube::Piece;
+using Shares = SmoothCube::Shares;
 
 NetPoints gather(const Piece& piece, const NetPoints& points) {
   NetPoints out(piece.columns.size(), 3);
@@ -223,7 +193,7 @@ class Fitter {
                     : cube.spans() == 2 ? 13
                                         : 2 * cube.degree() + 3),
         check_(cube, grid_.places() + 4),
-        pieces_(make_pieces(cube)),
+        pieces_(cube.pieces()),
         system_(cube, pieces_) {
     const size_t samples = pieces_.size() * grid_.places() * grid_.places();
     weight_.assign(samples, 1);
@@ -244,7 +214,7 @@ class Fitter {
       for (int b = 0; b < cube.spans(); ++b)
         for (int i = 0; i < grid_.places(); ++i)
           for (int j = 0; j < grid_.places(); ++j)
-            shares_.push_back(tensor(grid_.at(a, i), grid_.at(b, j), cube.degree()));
+            shares_.push_back(cube.shares(grid_.at(a, i), grid_.at(b, j)));
   }
 
   ConvexFit run(const NetPoints& start) {
@@ -430,8 +400,7 @@ class Fitter {
       const NetPoints local = gather(piece, points_);
       for (int i = 0; i < check_.places(); ++i)
         for (int j = 0; j < check_.places(); ++j, ++at) {
-          const Local f =
-              local_surface(local, tensor(check_.at(piece.a, i), check_.at(piece.b, j), cube_.degree()));
+          const Local f = local_surface(local, cube_.shares(check_.at(piece.a, i), check_.at(piece.b, j)));
           const TargetOffset t = target_(f.x, f.normal, check_hint_[at]);
           const double cut = t.distance < 0 ? kCutSlope : 1;
           out.error = std::max(out.error, cut * std::abs(t.distance) / (options_.metric * t.gradient).norm());
@@ -515,7 +484,7 @@ ConvexFit raise_curvature(const SmoothCube& cube, ConvexFit fit, const OffsetTar
 }
 
 NetPoints fit_points(const SmoothCube& cube, const NetTarget& target) {
-  const std::vector<Piece> pieces = make_pieces(cube);
+  const std::vector<Piece> pieces = cube.pieces();
   const Grid grid(cube, cube.degree() + 3);
   const Sparse& c = cube.conditions();
   const int count = cube.count(), size = count + static_cast<int>(c.rows());
@@ -526,7 +495,7 @@ NetPoints fit_points(const SmoothCube& cube, const NetTarget& target) {
     Eigen::MatrixXd mass = Eigen::MatrixXd::Zero(n, n);
     for (int i = 0; i < grid.places(); ++i)
       for (int j = 0; j < grid.places(); ++j) {
-        const Vector s = tensor(grid.at(piece.a, i), grid.at(piece.b, j), cube.degree()).col(0);
+        const Vector s = cube.shares(grid.at(piece.a, i), grid.at(piece.b, j)).col(0);
         const double u = (piece.a + i / (grid.places() - 1.0)) / cube.spans(),
                      v = (piece.b + j / (grid.places() - 1.0)) / cube.spans();
         const Vec3 x = target(piece.face, u, v);

@@ -5,6 +5,7 @@
 #include <Eigen/SparseCholesky>
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "shapes/smooth_cube.h"
 
@@ -25,18 +26,7 @@ constexpr double kKept = 0.95;      // share of the present curvature that may b
 constexpr double kBacktrack = 0.6, kShortest = 1e-4;
 constexpr double kRegular = 1e-9;  // of the conditions' block of the matrix
 
-// Shares of a piece's control points in g, g_a, g_b, g_aa, g_ab, g_bb.
-using Shares = Eigen::Matrix<double, Eigen::Dynamic, 6>;
-
-Shares tensor(const SmoothCube::Basis& u, const SmoothCube::Basis& v, int degree) {
-  const int n = degree + 1;
-  Shares out(n * n, 6);
-  for (int i = 0; i < n; ++i)
-    for (int j = 0; j < n; ++j)
-      out.row(i * n + j) << u.value[i] * v.value[j], u.slope[i] * v.value[j], u.value[i] * v.slope[j],
-          u.bend[i] * v.value[j], u.slope[i] * v.slope[j], u.value[i] * v.bend[j];
-  return out;
-}
+using Shares = SmoothCube::Shares;  // in g, g_a, g_b, g_aa, g_ab, g_bb
 
 // A ray: its point of the cube, with the derivatives there by the face's parameters.
 struct Ray {
@@ -148,13 +138,12 @@ class Barrier {
     for (int a = 0; a < spans; ++a)
       for (int b = 0; b < spans; ++b)
         for (int i = 0; i < n; ++i)
-          for (int j = 0; j < n; ++j) shares_.push_back(tensor(bases[a * n + i], bases[b * n + j], p));
+          for (int j = 0; j < n; ++j) shares_.push_back(cube_.shares(bases[a * n + i], bases[b * n + j]));
     int facet = 0;
-    for (int k = 0; k < kCubeFaces * spans * spans; ++k) {
-      const int f = k / (spans * spans), a = k / spans % spans, b = k % spans;
-      columns_.emplace_back();
-      for (int i = 0; i <= p; ++i)
-        for (int j = 0; j <= p; ++j) columns_.back().push_back(cube_.index(f, a, b, i, j));
+    for (SmoothCube::Piece& of : cube_.pieces()) {
+      const int f = of.face, a = of.a, b = of.b;
+      const int k = static_cast<int>(columns_.size());
+      columns_.push_back(std::move(of.columns));
       for (int i = 0; i < n; ++i)
         for (int j = 0; j < n; ++j) {
           const Vec3 y = cube_direction(f, cube_.parameter(a, at(i)), cube_.parameter(b, at(j)));
@@ -184,7 +173,7 @@ class Barrier {
     }
     Vertex s;
     static_cast<Ray&>(s) = make_ray(piece(f, span[0], span[1]), f, v / size, 1 / size);
-    s.shares = tensor(basis[0], basis[1], cube_.degree());
+    s.shares = cube_.shares(basis[0], basis[1]);
     vertices_.push_back(std::move(s));
   }
 

@@ -312,9 +312,9 @@ class HullFitter {
     if (options_.spans == 0 && try_sphere()) return best_;
     std::vector<Vec3> even;
     for (const Vec3& p : hull_.mesh().points) even.emplace_back(frame_.to * (p - frame_.center));
-    const RayTarget target{ConvexHull(even)};
-    const bool any = options_.spans == 0;
     const ConvexHull even_hull(even);
+    const RayTarget target(even_hull);
+    const bool any = options_.spans == 0;
     int further = 0;
     for (const auto& [degree, spans] : kLadder) {
       if ((!any && spans != options_.spans) || too_many(degree, spans)) continue;
@@ -335,6 +335,10 @@ class HullFitter {
       if (best_.shape && further++ == kFurther) break;
     }
     if (best_.shape) return best_;  // its convexity is measured, not proven
+    if (options_.most_points > 0)
+      throw ShapeError("no body of at most " + std::to_string(options_.most_points) +
+                       " control points is within the tolerance of " + percent(options_.tolerance) +
+                       " of the hull");
     throw ShapeError("no body of up to " + std::to_string(most_points_) +
                      " control points is within the tolerance of " + percent(options_.tolerance) +
                      " of the hull; the best is within " + percent(least_) +
@@ -361,12 +365,8 @@ class HullFitter {
   }
 
   bool too_many(int degree, int spans) const {
-    if (options_.most_points == 0) return false;
-    size_t points = 0;
-    const SmoothCube cube(degree, spans);
-    for (const NurbsSurface& s : cube.surfaces(NetPoints(NetPoints::Zero(cube.count(), 3))))
-      points += s.points.size();
-    return points > options_.most_points;
+    const size_t size = SmoothCube::net_size(degree, spans);
+    return options_.most_points > 0 && kCubeFaces * size * size > options_.most_points;
   }
 
   // Whether the error so far can't fall to the tolerance by going to this rung, or the rung costs too much
@@ -473,9 +473,7 @@ class HullFitter {
       if (freed.error < fit.error) fit = std::move(freed);
     }
     const double reached = fit.error / radius_;
-    const std::string kind = std::string(degree == 3 ? "bicubic" : "biquartic") + ", " +
-                             std::to_string(spans) + " x " + std::to_string(spans) + " spans, " +
-                             std::to_string(cube.count()) + " control points";
+    const std::string kind = rung_name("", degree, spans, cube.count());
     if (fit.error > 1.5 * tolerance_) {
       say(kind + (fit.error < kFar ? ": off by about " + percent(reached) : ": not convex"));
       if (fit.error < kFar) least_ = std::min(least_, reached);
@@ -497,10 +495,7 @@ class HullFitter {
   // points can.
   bool polynomials_may_do(const ConvexHull& even) {
     if (gauge_spans_ == 0) {
-      GaugeFitOptions options;
-      options.inward = kAim * tolerance_;
-      options.outward = kOutwardAim * tolerance_;
-      options.metric = frame_.metric;
+      GaugeFitOptions options = gauge_options();
       const auto& [degree, spans] = kGaugeLadder[0];
       options.least_curvature = kLeastCurvature;
       gauge_error_ = fit_gauge(degree, spans, even, options).error * kAim * tolerance_;
@@ -513,13 +508,8 @@ class HullFitter {
   bool try_gauge(int degree, int spans, const ConvexHull& even) {
     const int count = SmoothCube(degree, spans).count();
     most_points_ = std::max(most_points_, count);
-    const std::string kind = std::string(degree == 3 ? "rational bicubic" : "rational biquartic") + ", " +
-                             std::to_string(spans) + " x " + std::to_string(spans) + " spans, " +
-                             std::to_string(count) + " control points";
-    GaugeFitOptions options;
-    options.inward = kAim * tolerance_;
-    options.outward = kOutwardAim * tolerance_;
-    options.metric = frame_.metric;
+    const std::string kind = rung_name("rational ", degree, spans, count);
+    GaugeFitOptions options = gauge_options();
     for (double share : kGaugeCurvatures) {
       options.least_curvature = std::clamp(share * tolerance_ / radius_, kLeastCurvature, kMostCurvature);
       for (int pass = 0; pass < 2; ++pass) {  // what certifies further away is asked to be nearer
@@ -540,6 +530,19 @@ class HullFitter {
       least_ = std::min(least_, gauge_error_ / radius_);
     }
     return false;
+  }
+
+  static std::string rung_name(const std::string& prefix, int degree, int spans, int count) {
+    return prefix + (degree == 3 ? "bicubic" : "biquartic") + ", " + std::to_string(spans) + " x " +
+           std::to_string(spans) + " spans, " + std::to_string(count) + " control points";
+  }
+
+  GaugeFitOptions gauge_options() const {
+    GaugeFitOptions options;
+    options.inward = kAim * tolerance_;
+    options.outward = kOutwardAim * tolerance_;
+    options.metric = frame_.metric;
+    return options;
   }
 
   ConvexFitOptions aimed_at(double aim) const {

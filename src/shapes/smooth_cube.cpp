@@ -64,8 +64,35 @@ SmoothCube::SmoothCube(int degree, int spans, CubeKind kind)
       multiplicity_(knot_multiplicity(degree)),
       breaks_(span_ends(spans, kind)),
       knots_(spline_knots(degree, breaks_, multiplicity_)),
-      net_((spans - 1) * multiplicity_ + degree + 1),
+      net_(net_size(degree, spans)),
       conditions_(joint_conditions()) {}
+
+int SmoothCube::net_size(int degree, int spans) {
+  return (spans - 1) * knot_multiplicity(degree) + degree + 1;
+}
+
+std::vector<SmoothCube::Piece> SmoothCube::pieces() const {
+  std::vector<Piece> pieces;
+  for (int f = 0; f < kCubeFaces; ++f)
+    for (int a = 0; a < spans_; ++a)
+      for (int b = 0; b < spans_; ++b) {
+        Piece piece{f, a, b, {}};
+        for (int i = 0; i <= degree_; ++i)
+          for (int j = 0; j <= degree_; ++j) piece.columns.push_back(index(f, a, b, i, j));
+        pieces.push_back(std::move(piece));
+      }
+  return pieces;
+}
+
+SmoothCube::Shares SmoothCube::shares(const Basis& u, const Basis& v) const {
+  const int n = degree_ + 1;
+  Shares out(n * n, 6);
+  for (int i = 0; i < n; ++i)
+    for (int j = 0; j < n; ++j)
+      out.row(i * n + j) << u.value[i] * v.value[j], u.slope[i] * v.value[j], u.value[i] * v.slope[j],
+          u.bend[i] * v.value[j], u.slope[i] * v.slope[j], u.value[i] * v.bend[j];
+  return out;
+}
 
 int SmoothCube::span_of(double parameter) const {
   int a = 0;

@@ -52,6 +52,20 @@ class SmoothCube {
   };
   Basis basis(int a, double t) const;
 
+  // One span of one face, with the indices of its control points.
+  struct Piece {
+    int face, a, b;
+    std::vector<int> columns;
+  };
+  std::vector<Piece> pieces() const;
+
+  // What each control point of a piece adds at one place: columns value, u, v, uu, uv, vv.
+  using Shares = Eigen::Matrix<double, Eigen::Dynamic, 6>;
+  Shares shares(const Basis& u, const Basis& v) const;
+
+  // Control points along one parameter of a face.
+  static int net_size(int degree, int spans);
+
   std::vector<NurbsSurface> surfaces(const NetPoints& points) const;
   std::vector<NurbsSurface> surfaces(const Eigen::VectorXd& gauge) const;
 

@@ -6,6 +6,7 @@
 #include "contact/pair_search.h"
 #include "scene/contact_stages.h"
 #include "support/bodies.h"
+#include "support/host_bodies.h"
 #include "support/random.h"
 
 namespace nurbs {
@@ -13,15 +14,14 @@ namespace {
 
 using test::Random;
 
-// Bodies as a host holds them, thrown about in a small space above the plane z = 0.
-struct Heap {
+// Thrown about in a small space above the plane z = 0.
+struct Heap : test::HostBodies {
   std::vector<test::ShapePointer> kept;
-  std::vector<const Shape*> shapes{nullptr};
-  std::vector<double> x, v, w, q, mass, scale, radius;
-  std::vector<int> shape, mask, types;
+  std::vector<int> types;
   double dt = 1e-3;
 
   Heap(Random& random, const std::vector<test::ShapePointer>& from, int count, double spread) : kept(from) {
+    shapes.push_back(nullptr);
     for (const auto& s : kept) shapes.push_back(s.get());
     for (int i = 0; i < count; ++i) {
       const int which = 1 + i % static_cast<int>(kept.size());
@@ -41,22 +41,6 @@ struct Heap {
       types.push_back(1);
     }
   }
-  int count() const { return static_cast<int>(mass.size()); }
-  BodyArrays arrays() const {
-    BodyArrays a;
-    a.count = count();
-    a.x = x.data();
-    a.velocity = v.data();
-    a.spin = w.data();
-    a.quaternion = q.data();
-    a.mass = mass.data();
-    a.scale = scale.data();
-    a.radius = radius.data();
-    a.shape = shape.data();
-    a.shapes = shapes.data();
-    a.mask = mask.data();
-    return a;
-  }
   Particle particle(int i) const {
     Particle p;
     p.shape = shapes[shape[i]];
@@ -74,12 +58,8 @@ struct Heap {
   void move() {  // each about its place
     for (int i = 0; i < count(); ++i) {
       for (int k = 0; k < 3; ++k) x[3 * i + k] += dt * v[3 * i + k];
-      const Vec3 turn = dt * Vec3::Map(&w[3 * i]);
-      const Quat now = (Quat(Eigen::AngleAxisd(turn.norm(), turn.normalized())) * particle(i).q).normalized();
-      q[4 * i] = now.w();
-      q[4 * i + 1] = now.x();
-      q[4 * i + 2] = now.y();
-      q[4 * i + 3] = now.z();
+      const Vec3 by = dt * Vec3::Map(&w[3 * i]);
+      turn(i, (Quat(Eigen::AngleAxisd(by.norm(), by.normalized())) * particle(i).q).normalized());
     }
   }
 };

@@ -304,6 +304,13 @@ class Fit(unittest.TestCase):
         self.assertEqual(again.returncode, 1)
         self.assertIn("ERROR: ", again.stderr)
 
+    def test_simplify_of_the_simplest(self):
+        """A body of six patches of one span: nothing has fewer points, and that is what is said."""
+        made = call("make", "pebble", "--seed", "3", self.place / "fine.json")
+        self.assertEqual(made.returncode, 0, made.stderr)
+        self.assert_one_error(call("simplify", self.place / "fine.json", "--tolerance", "1%", "-o", self.out),
+                              "no body of at most 95 control points")
+
 
 if __name__ == "__main__":
     unittest.main()

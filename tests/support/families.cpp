@@ -816,11 +816,7 @@ Answer follow(const PairCase& c, int lane) {
   JointLanes pairs{};
   const auto set_turn = [&](const Quat& q, Turn<Wide>* to) {
     const Turn<double> m = turn(q.normalized().toRotationMatrix());
-    for (int k = 0; k < 3; ++k) {
-      to->row[k].x[lane] = m.row[k].x;
-      to->row[k].y[lane] = m.row[k].y;
-      to->row[k].z[lane] = m.row[k].z;
-    }
+    for (int k = 0; k < 3; ++k) set_lane(m.row[k], lane, &to->row[k]);
   };
   const double ra = c.a.scale * c.a.shape->bounding_radius, rb = c.b.scale * c.b.shape->bounding_radius;
   const Vec3 offset = c.b.x - c.a.x;
@@ -832,23 +828,20 @@ Answer follow(const PairCase& c, int lane) {
   pairs.scale_b[lane] = c.b.scale;
   set_turn(c.a.q, &pairs.turn_a);
   set_turn(c.b.q, &pairs.turn_b);
-  pairs.offset.x[lane] = offset[0];
-  pairs.offset.y[lane] = offset[1];
-  pairs.offset.z[lane] = offset[2];
+  set_lane(triple(offset), lane, &pairs.offset);
   pairs.size[lane] = std::min(ra, rb);
   pairs.reach[lane] = std::max(ra, rb);
   pairs.tolerance[lane] = std::max(c.tolerance * std::min(ra, rb), kLeastTolerance * std::max(ra, rb));
   if (follow_joints(1u << lane, std::numeric_limits<double>::infinity(), &pairs) == 0) return answer;
-  const auto at = [lane](const Triple<Wide>& v) { return Vec3(v.x[lane], v.y[lane], v.z[lane]); };
   answer.given = answer.has_normal = answer.has_bracket = answer.has_points = true;
   answer.rung = static_cast<int>(Rung::warm);
   answer.gap = pairs.gap[lane];
   answer.lower = pairs.lower[lane];
   answer.upper = pairs.upper[lane];
-  answer.normal = at(pairs.normal);
+  answer.normal = nurbs::lane(pairs.normal, lane);
   // As a result's, whose points are the gap apart.
-  answer.point_a = at(pairs.point_a);
-  answer.point_b = at(pairs.point_b);
+  answer.point_a = nurbs::lane(pairs.point_a, lane);
+  answer.point_b = nurbs::lane(pairs.point_b, lane);
   const Vec3 shift = 0.5 * (answer.gap - answer.normal.dot(answer.point_b - answer.point_a)) * answer.normal;
   answer.point_a -= shift;
   answer.point_b += shift;
