@@ -202,7 +202,10 @@ int FixWallNurbs::setmask() {
 
 void FixWallNurbs::init() {
   bodies_ = AtomVecNurbs::require(lmp, "Fix wall/nurbs");
-  if (const PairGranNurbs* pair = PairGranNurbs::find(lmp)) settings_ = pair->contact_settings();
+  if (const PairGranNurbs* pair = PairGranNurbs::find(lmp)) {
+    settings_ = pair->contact_settings();
+    warn_models(*pair);
+  }
   freeze_groupbit_ = 0;
   for (int k = 0; k < modify->nfix; ++k)
     if (std::strcmp(modify->fix[k]->style, "freeze") == 0) freeze_groupbit_ = modify->fix[k]->groupbit;
@@ -219,6 +222,22 @@ void FixWallNurbs::init() {
   if (models_) models_->init();
   warn_periodic();
   warn_time_step();
+}
+
+// The host's walls go without it silently, too; `off` says that it is meant.
+void FixWallNurbs::warn_models(const PairGranNurbs& pair) {
+  if (models_ == nullptr || pair.models() == nullptr) return;
+  std::string missing;
+  for (const char* kind : {"cohesion", "rolling_friction"}) {
+    const std::string pairs = pair.models()->named(kind);
+    if (!pairs.empty() && pairs != "off" && models_->named(kind).empty())
+      missing += (missing.empty() ? "" : " and ") + std::string(kind) + " " + pairs;
+  }
+  if (missing.empty()) return;
+  nurbs_host::warn_news(FLERR, lmp,
+                        std::string("Fix wall/nurbs ") + id + " has no " + missing +
+                            ", which pair_style gran/nurbs has; say it behind the wall's model too, or off",
+                        last_model_warning_);
 }
 
 void FixWallNurbs::warn_periodic() {
@@ -542,31 +561,71 @@ int FixWallNurbs::unpack_exchange(int i, double* buffer) {
   return nurbs::kProofSize + size;
 }
 
+// What a restart holds of a wall.
+struct FixWallNurbs::Kept {
+  double damping, friction;  // dissipated
+  double time;               // of the motion
+  double listed, kind;
+  double point[3], normal[3], radius;  // of a plane or cylinder: where it was
+};
+
 void FixWallNurbs::write_restart(FILE* file) {
   const nurbs::EnergyLedger& done = stages_.dissipated();
-  double mine[2] = {done.damping, done.friction}, all[4] = {0, 0, time_, listed() ? 1.0 : 0.0};
+  double mine[2] = {done.damping, done.friction}, all[2] = {0, 0};
   MPI_Reduce(mine, all, 2, MPI_DOUBLE, MPI_SUM, 0, world);
   if (comm->me != 0) return;
-  const int size = sizeof all;
+  Kept kept = {all[0], all[1], time_, listed() ? 1.0 : 0.0, static_cast<double>(kind_), {}, {}, radius_};
+  Vec3Map{kept.point} = motion_.point(origin_, time_);
+  Vec3Map{kept.normal} = motion_.direction(normal_, time_);
+  const int size = sizeof kept;
   std::fwrite(&size, sizeof size, 1, file);
-  std::fwrite(all, sizeof all, 1, file);
+  std::fwrite(&kept, sizeof kept, 1, file);
+}
+
+// How far this plane or cylinder is, somewhere in the box, from where it was: the difference is linear in
+// place.
+double FixWallNurbs::way_since(const Kept& kept) const {
+  const Vec3 old_point = Vec3::Map(kept.point), old_normal = Vec3::Map(kept.normal);
+  const Vec3 point = motion_.point(origin_, time_), normal = motion_.direction(normal_, time_);
+  double most = 0;
+  for (int corner = 0; corner < 8; ++corner) {
+    Vec3 x;
+    for (int k = 0; k < 3; ++k) x[k] = corner >> k & 1 ? domain->boxhi[k] : domain->boxlo[k];
+    if (kind_ == Kind::plane) {
+      most = std::max(most, std::abs(normal.dot(x - point) - old_normal.dot(x - old_point)));
+      continue;
+    }
+    const auto foot = [&](const Vec3& p, const Vec3& n) -> Vec3 { return p + n.dot(x - p) * n; };
+    most = std::max(
+        most, (foot(point, normal) - foot(old_point, old_normal)).norm() + std::abs(radius_ - kept.radius));
+  }
+  return most;
 }
 
 void FixWallNurbs::restart(char* buffer) {
-  const double* values = reinterpret_cast<const double*>(buffer);
+  Kept kept;
+  std::memcpy(&kept, buffer, sizeof kept);
   nurbs::EnergyLedger& done = stages_.dissipated();
   done = nurbs::EnergyLedger{};
-  time_ = last_time_ = values[2];
-  was_another_kind_ = (values[3] != 0) != listed();
+  time_ = last_time_ = kept.time;
+  was_another_kind_ = (kept.listed != 0) != listed();
   if (was_another_kind_)
     nurbs_host::warn(
         FLERR, lmp,
         std::string("Fix wall/nurbs ") + id +
             ": in the restart, the wall of this ID was of another kind (a plane at rest, or a moving "
             "plane, cylinder or mesh); its contacts begin anew");
+  if (kind_ != Kind::mesh && static_cast<double>(kind_) == kept.kind) {
+    const Vec3 edges = Vec3Map(domain->boxhi) - Vec3Map(domain->boxlo);
+    const double way = way_since(kept);
+    if (way > 1e-9 * edges.norm())
+      nurbs_host::warn(FLERR, lmp,
+                       std::string("Fix wall/nurbs ") + id + ": the wall is " + nurbs_host::show(way) +
+                           " from where it was in the restart; repeat the line it had, 'move ..' included");
+  }
   if (comm->me != 0) return;
-  done.damping = values[0];
-  done.friction = values[1];
+  done.damping = kept.damping;
+  done.friction = kept.friction;
 }
 
 int FixWallNurbs::size_restart(int i) {

@@ -105,6 +105,9 @@ class FixWallNurbs : public Fix {
   void tell_meshes();
   void sum_mesh_forces();
   int contacts_size(int i) const;
+  struct Kept;
+  double way_since(const Kept& kept) const;
+  void warn_models(const class PairGranNurbs& pair);
   void warn_periodic();
   void warn_time_step();
   void warn_deep(const char* when);
@@ -132,7 +135,7 @@ class FixWallNurbs : public Fix {
   bool was_another_kind_ = false;  // in the restart that is read
   bool periodic_warned_ = false;
   bigint checked_particles_ = 0;  // when deep contacts were last looked for
-  std::string last_warning_, last_deep_warning_;
+  std::string last_warning_, last_deep_warning_, last_model_warning_;
 };
 
 }  // namespace LAMMPS_NS

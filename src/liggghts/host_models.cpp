@@ -342,6 +342,13 @@ bool HostModels::matches(const std::string& kind, const std::string& name) const
   return false;
 }
 
+std::string HostModels::named(const std::string& kind) const {
+  std::istringstream words(text_);
+  for (std::string word; words >> word;)
+    if (word == kind) return words >> word ? word : "";
+  return "";
+}
+
 std::int64_t HostModels::hashcode() const {
   const int* id = models_->ids;
   return LIGGGHTS::Utils::generate_gran_hashcode(id[0], id[1], id[2], id[3], host::SURFACE_DEFAULT);

@@ -38,6 +38,8 @@ class HostModels : public nurbs::ContactModel {
   std::string layout() const;
   // As the host's own pair style answers.
   bool matches(const std::string& kind, const std::string& name) const;
+  // The name behind model, tangential, cohesion or rolling_friction, or empty.
+  std::string named(const std::string& kind) const;
   std::int64_t hashcode() const;
   double stress_strain_exponent() const;
   // What compute nurbs/energy can't know of these models, empty if nothing.

@@ -178,16 +178,35 @@ void check_fix(LAMMPS* lmp, Fix* fix, std::set<std::string>* told) {
   check_insertion(lmp, fix);
 }
 
-// Walls of a restart file that the input script doesn't name again.
-void warn_lost_walls(LAMMPS* lmp, std::set<std::string>* told) {
-  for (int k = 0;; ++k) {
-    char* id = lmp->modify->id_restart_data_global_style("wall/nurbs", k);
-    if (id == nullptr) return;
-    if (lmp->modify->find_fix(id) < 0)
-      warn_once(lmp, told,
-                std::string("The restart file holds contacts of fix wall/nurbs ") + id +
-                    ", which there is no longer: a wall of another ID starts without them");
+// Fixes of a restart file that the input script doesn't name again by their IDs and styles; of meshes only
+// where there are such as are missed.
+void warn_lost_fixes(LAMMPS* lmp, std::set<std::string>* told) {
+  Modify& modify = *lmp->modify;
+  bool meshes = false, new_meshes = false;
+  for (int k = 0; k < modify.nfix; ++k) {
+    if (dynamic_cast<FixMeshSurface*>(modify.fix[k]) == nullptr) continue;
+    meshes = true;
+    new_meshes |= !modify.have_restart_data(modify.fix[k]);
   }
+  struct Lost {
+    const char *style, *what, *missed;
+    bool matters;
+  };
+  const Lost losses[] = {
+      {"wall/nurbs", "contacts of", "a wall of another ID starts without them", true},
+      {"move/mesh", "the motion of", "its mesh stands still, or begins a motion of another ID anew", meshes},
+      {"mesh/surface", "the place of", "a mesh of another ID or style starts where its file has it",
+       new_meshes}};
+  for (const Lost& lost : losses)
+    for (int k = 0; lost.matters; ++k) {
+      char* id = modify.id_restart_data_global_style(lost.style, k);
+      if (id == nullptr) break;
+      const int here = modify.find_fix(id);
+      if (here < 0 || !modify.have_restart_data(modify.fix[here]))
+        warn_once(lmp, told,
+                  std::string("The restart file holds ") + lost.what + " fix " + lost.style + " " + id +
+                      ", which there is no longer: " + lost.missed);
+    }
 }
 
 }  // namespace
@@ -203,7 +222,7 @@ void check_host(LAMMPS* lmp, std::set<std::string>* told) {
   warn_default_step(lmp, told);
   check_pair_style(lmp, told);
   for (int k = 0; k < lmp->modify->nfix; ++k) check_fix(lmp, lmp->modify->fix[k], told);
-  warn_lost_walls(lmp, told);
+  warn_lost_fixes(lmp, told);
 }
 
 }  // namespace LAMMPS_NS::nurbs_host

@@ -403,6 +403,63 @@ class Warned(unittest.TestCase):
     def test_sphere_volumes(self):
         self.assertIn("bounding spheres", "".join(self.warnings(DECK + "fix w all buoyancy level 3 dim z density 1000\nrun 1\n")))
 
+    PLATE = ("solid m\nfacet normal 0 0 1\nouter loop\nvertex -5 -5 0\nvertex 5 -5 0\nvertex 0 5 0\nendloop\nendfacet\n"
+             "endsolid m\n")
+
+    def test_a_mesh_that_moved_before_a_restart(self):
+        """Its motion and its place are known by ID; left out or named otherwise, it stands or starts anew, which is said."""
+        mesh = "fix m all mesh/surface file m.stl type 1\n"
+        move = "fix mv all move/mesh mesh m linear 0 0 1\n"
+        text = DECK.replace("fix floor all wall/nurbs plane 0 0 0 0 0 1", mesh + move + "fix floor all wall/nurbs mesh m")
+        run = deck.run_ok(text + "run 10\nwrite_restart a.restart\n", files={**files(), "m.stl": self.PLATE})
+        more = {"a.restart": run.path / "a.restart", "m.stl": self.PLATE}
+        again = text[:text.index("atom_style")] + "boundary p p f\nread_restart a.restart\n" + text[text.index("neighbor"):]
+        again = again.replace("pair_style", "#").replace("pair_coeff", "#") + "run 1\nrun 1\n"
+        for ranks in (1, 2):
+            self.assertEqual([line for line in self.warnings(again, more, ranks) if "restart file holds" in line], [])
+            for old, new, words in ((move, "", "the motion of fix move/mesh mv"), ("fix mv", "fix mw", "the motion of fix move/mesh mv"),
+                                    ("mesh/surface file", "mesh/surface/stress file", "the place of fix mesh/surface m")):
+                told = [line for line in self.warnings(again.replace(old, new), more, ranks) if "restart file holds" in line]
+                self.assertEqual(len(told), 1, told)
+                self.assertIn(words, told[0])
+        plane = again.replace(mesh + move, "").replace("mesh m", "plane 0 0 0 0 0 1")  # no meshes, nothing missed but contacts
+        self.assertFalse([line for line in self.warnings(plane, more) if "motion of" in line or "place of" in line])
+
+    def test_a_wall_that_is_elsewhere_than_in_the_restart(self):
+        for wall, elsewhere in (("plane 0 0 0 0 0 1", "plane 0 0 0.01 0 0 1"), ("cylinder x 9 0 6", "cylinder x 9 0.01 6")):
+            moving = f"{COEFFICIENTS} move linear 0 1e-9 1e-2"
+            floor = "fix floor all wall/nurbs plane 0 0 0 0 0 1 " + COEFFICIENTS
+            text = DECK.replace(floor, f"fix floor all wall/nurbs {wall} {moving}")
+            run = deck.run_ok(text + "run 100\nwrite_restart a.restart\n", files=files())
+            more = {"a.restart": run.path / "a.restart"}
+            again = text[:text.index("atom_style")] + "boundary p p f\nread_restart a.restart\n" + text[text.index("neighbor"):]
+            again = again.replace("pair_style", "#").replace("pair_coeff", "#") + "run 1\nrun 1\n"
+            for ranks in (1, 2):
+                told = lambda text: [line for line in self.warnings(text, more, ranks) if "from where it was" in line]  # noqa: E731
+                self.assertEqual(told(again), [])
+                for other, way in ((again.replace(moving, COEFFICIENTS), 1e-4), (again.replace(wall, elsewhere), 1e-2),
+                                   (again.replace("1e-9 1e-2", "1e-9 -1e-2"), 2e-4)):
+                    self.assertEqual(len(told(other)), 1)
+                    self.assertAlmostEqual(float(told(other)[0].split(" from where")[0].split()[-1]) / way, 1, delta=1e-3)
+
+    def test_walls_without_the_pair_styles_rolling_friction_or_cohesion(self):
+        """LIGGGHTS's own walls go without a word; here it is said once, unless the wall says off."""
+        rolling = ("fix m5 all property/global coefficientRollingFriction peratomtypepair 2 .1 .1 .1 .1\n"
+                   "fix m6 all property/global cohesionEnergyDensity peratomtypepair 2 10 10 10 10\n")
+        materials = MATERIALS.replace("peratomtype 5e6", "peratomtype 5e6 5e6").replace("peratomtype 0.3", "peratomtype .3 .3").replace(
+            "peratomtypepair 1 0.5", "peratomtypepair 2 .5 .5 .5 .5").replace("peratomtypepair 1 0.4", "peratomtypepair 2 .4 .4 .4 .4")
+        text = DECK.replace(f"pair_style gran/nurbs\npair_coeff * * {COEFFICIENTS}", materials + rolling + "pair_style gran/nurbs PAIR\npair_coeff * *")
+        text = text.replace(f"0 0 1 {COEFFICIENTS}", "0 0 1 type 1 WALL")
+        model = "model hertz tangential history"
+        for pair, wall, words in ((" cohesion sjkr rolling_friction cdt", "", "no cohesion sjkr and rolling_friction cdt"),
+                                  (" cohesion sjkr rolling_friction cdt", " rolling_friction cdt", "no cohesion sjkr,"),
+                                  (" rolling_friction cdt", " rolling_friction off", None), (" rolling_friction off", "", None), ("", "", None)):
+            for ranks in (1, 2):
+                told = [line for line in self.warnings(text.replace("PAIR", model + pair).replace("WALL", model + wall) + "run 1\nrun 1\n", ranks=ranks)
+                        if "Fix wall/nurbs floor has no" in line]
+                self.assertEqual(len(told), 0 if words is None else 1, told)
+                self.assertIn(words or "", "".join(told))
+
     def test_wall_of_another_name_after_a_restart(self):
         run = deck.run_ok(DECK + "set group all z 0.2\nset atom 2 x 4 z 0.2\nrun 1\nwrite_restart a.restart\n", files=files())
         restart = {"a.restart": run.path / "a.restart"}
