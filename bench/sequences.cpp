@@ -60,7 +60,7 @@ int main_program(int argc, char** argv) {
     const double began = bench::thread_seconds();
     const std::uint64_t own = 1000 * seed + static_cast<std::uint64_t>(k);
     const Report r = b ? sequences::run_pair(a, *b, own, steps) : sequences::run_plane(a, own, steps);
-    std::fprintf(out, "%s,%s,%ld,%ld,%ld,%ld,%ld,%ld,%.3g,%.1f\n", a.name.c_str(),
+    std::fprintf(out, "\"%s\",\"%s\",%ld,%ld,%ld,%ld,%ld,%ld,%.3g,%.1f\n", a.name.c_str(),
                  b ? b->name.c_str() : "plane", r.steps, r.judged, r.touching, r.unresolved, r.wrong,
                  r.bracket, r.worst, bench::thread_seconds() - began);
     std::fflush(out);

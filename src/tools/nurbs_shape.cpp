@@ -54,7 +54,18 @@ constexpr char kInertiaNotes[] =
 
 struct Argument {
   const char *name, *value, *about;
+  bool needed = false;  // its usage line names it
 };
+
+std::string usage(const std::string& kind, const std::vector<Argument>& options) {
+  std::string line = "nurbs-shape make " + kind;
+  bool more = false;
+  for (const Argument& a : options) {
+    if (a.needed) line += std::string(" ") + a.name + " " + a.value;
+    more |= !a.needed;
+  }
+  return line + (more ? " [options]" : "") + " -o FILE";
+}
 
 // The arguments of one kind of body, each used at most once and none unknown.
 class Options {
@@ -398,10 +409,11 @@ struct Maker {
 };
 
 const std::vector<Maker>& makers() {
-  static const Argument kRadius{"--radius", "R", "default 1"}, kAxes{"--axes", "A,B,C", "semi-axes"},
+  static const Argument kRadius{"--radius", "R", "default 1, which is 1 m in a deck of SI units"},
+      kAxes{"--axes", "A,B,C", "semi-axes", true},
       kSpans{"--spans", "N", "of a patch in each direction, 1 to 12, default 1: more fit better"};
-  static const Argument kOuter{"--radius", "R", "of the body, across its axis"},
-      kRim{"--rim", "R", "radius of the rim's rounding"};
+  static const Argument kOuter{"--radius", "R", "of the body, across its axis", true},
+      kRim{"--rim", "R", "radius of the rim's rounding", true};
   static const std::vector<Maker> kMakers = {
       {"sphere", "exact, six biquartic rational patches", {kRadius}, make_sphere, "--radius 0.005"},
       {"ellipsoid",
@@ -430,31 +442,31 @@ const std::vector<Maker>& makers() {
        "--seed 7 --radius 0.005 --roundness 0.6 --elongation 0.8 --flatness 0.6"},
       {"capsule",
        "exact: cylinder with half spheres, axis z",
-       {kOuter, {"--length", "L", "of the cylinder"}},
+       {kOuter, {"--length", "L", "of the cylinder", true}},
        make_capsule,
        "--radius 0.003 --length 0.01"},
       {"tablet",
        "exact: cylinder with rounded rims, axis z; with --cap biconvex",
        {kOuter,
         {"--height", "H",
-         "of the whole tablet from face to face; with --cap of its cylindrical band alone, 0 for none"},
+         "of the whole tablet from face to face; with --cap of its cylindrical band alone, 0 for none", true},
         kRim,
         {"--cap", "C", "makes both faces domes, of this radius of curvature, at least that of the tablet"}},
        make_tablet,
        "--radius 0.004 --height 0.003 --rim 0.0005"},
       {"lens",
        "exact: two spherical caps with a rounded rim, axis z",
-       {kOuter, {"--cap", "C", "radius of the caps"}, kRim},
+       {kOuter, {"--cap", "C", "radius of the caps", true}, kRim},
        make_lens,
        "--radius 0.005 --cap 0.008 --rim 0.0003"},
       {"egg",
        "exact: halves of two ellipsoids of revolution, axis z",
-       {kOuter, {"--blunt", "A", "height of the blunt half"}, {"--pointed", "B", "of the other"}},
+       {kOuter, {"--blunt", "A", "height of the blunt half", true}, {"--pointed", "B", "of the other", true}},
        make_egg,
        "--radius 0.004 --blunt 0.004 --pointed 0.006"},
       {"rounded-box",
        "exact: flat faces, edges of cylinders, corners of spheres",
-       {{"--axes", "A,B,C", "half edges"}, {"--rounding", "R", "radius of edges and corners"}},
+       {{"--axes", "A,B,C", "half edges", true}, {"--rounding", "R", "radius of edges and corners", true}},
        make_rounded_box,
        "--axes 0.01,0.008,0.006 --rounding 0.001"},
       {"rounded-polyhedron",
@@ -462,13 +474,13 @@ const std::vector<Maker>& makers() {
        {{"--solid", "NAME", "tetrahedron, cube, octahedron, dodecahedron or icosahedron"},
         {"--radius", "R", "of the sharp solid's corners, default 1"},
         {"--mesh", "FILE", "instead of --solid: the convex hull of a mesh (STL, OBJ, PLY)"},
-        {"--rounding", "R", "radius of edges and corners; faces stay where they are"}},
+        {"--rounding", "R", "radius of edges and corners; faces stay where they are", true}},
        make_rounded_polyhedron,
        "--solid octahedron --radius 0.01 --rounding 0.001"},
       {"superellipsoid",
        "|x/A|^E + |y/B|^E + |z/C|^E = 1, fitted: strictly convex, joints smooth",
        {kAxes,
-        {"--exponent", "E", "2 to 12"},
+        {"--exponent", "E", "2 to 12", true},
         {"--tolerance", "T",
          "share of the largest semi-axis, as 0.2%, the default: flat faces bulge by up to this"},
         {"--spans", "N",
@@ -477,13 +489,17 @@ const std::vector<Maker>& makers() {
        "--axes 1,1,2 --exponent 4 --tolerance 0.1%"},
       {"revolved",
        "exact ellipsoid, one rational patch, axis z",
-       {{"--equatorial", "A", "semi-axis"}, {"--polar", "C", "semi-axis"}},
+       {{"--equatorial", "A", "semi-axis", true}, {"--polar", "C", "semi-axis", true}},
        make_revolved,
        "--equatorial 0.01 --polar 0.005"},
-      {"box", "six flat faces", {{"--axes", "A,B,C", "half edges"}}, make_box, "--axes 0.01,0.008,0.006"},
+      {"box",
+       "six flat faces",
+       {{"--axes", "A,B,C", "half edges", true}},
+       make_box,
+       "--axes 0.01,0.008,0.006"},
       {"inertia",
        "near-ellipsoid of six bicubic patches with this inertia tensor about its centre of mass, the origin",
-       {{"--inertia", "XX,YY,ZZ,XY,XZ,YZ", "of the solid, about its centre of mass"},
+       {{"--inertia", "XX,YY,ZZ,XY,XZ,YZ", "of the solid, about its centre of mass", true},
         {"--mass", "M", "this, or --density, or both"},
         {"--density", "D", "of the uniform solid"}},
        make_inertia,
@@ -505,9 +521,9 @@ int next_prime(int n) {
 
 // Many random pebbles, and a deck that inserts them.
 const std::vector<Argument> kPebblesOptions = {
-    {"--count", "N", "1 to 100000"},
+    {"--count", "N", "1 to 100000", true},
     {"--seed", "N", "whole number, default 1"},
-    {"--radius", "R", "of the sphere of the same volume, default 1"},
+    {"--radius", "R", "of the sphere of the same volume, default 1, which is 1 m in a deck of SI units"},
     {"--roundness", "LO,HI", "drawn from this range, or one number; default 0.3,0.8"},
     {"--elongation", "LO,HI", "default 0.6,1"},
     {"--flatness", "LO,HI", "default 0.5,1"}};
@@ -554,8 +570,9 @@ void make_pebbles(const Options& options) {
   write_whole(stem + ".deck", style + "\n\n" + templates + "fix " + id +
                                   " all particledistribution/discrete 15485863 " + std::to_string(count) +
                                   distribution + "\n");
-  std::printf("%s_1.json to %s_%llu.json, %s.deck\n", stem.c_str(), stem.c_str(),
-              static_cast<unsigned long long>(count), stem.c_str());
+  std::printf("%s_1.json to %s_%llu.json, %s.deck; radius %g%s\n", stem.c_str(), stem.c_str(),
+              static_cast<unsigned long long>(count), stem.c_str(), radius,
+              options.has("--radius") ? "" : " (the default: 1 m in a deck of SI units; see --radius)");
 }
 
 void make(const Maker& maker, const Options& options) {
@@ -722,8 +739,7 @@ CLI::App* add_make(CLI::App& app, std::vector<Options>& options) {
       "nurbs-shape make KIND [options] -o FILE\n       nurbs-shape make KIND [options] FILE"));
   for (const Maker& maker : makers()) {
     CLI::App* kind = command->add_subcommand(maker.kind, maker.about);
-    kind->formatter(
-        std::make_shared<Help>("nurbs-shape make " + std::string(maker.kind) + " [options] -o FILE"));
+    kind->formatter(std::make_shared<Help>(usage(maker.kind, maker.options)));
     const std::string notes = maker.notes;
     kind->footer(notes + (notes.empty() ? "" : "\n") + "Example: nurbs-shape make " + maker.kind + " " +
                  maker.example + " -o " + maker.kind + ".json\n");
@@ -731,7 +747,7 @@ CLI::App* add_make(CLI::App& app, std::vector<Options>& options) {
   }
   CLI::App* pebbles =
       command->add_subcommand("pebbles", "many random pebbles, as one distribution for a deck");
-  pebbles->formatter(std::make_shared<Help>("nurbs-shape make pebbles --count N [options] -o FILE"));
+  pebbles->formatter(std::make_shared<Help>(usage("pebbles", kPebblesOptions)));
   pebbles->footer(std::string(kPebblesNotes) +
                   "\nExample: nurbs-shape make pebbles --count 20 --seed 3 --roundness 0.4,0.7 -o gravel\n");
   options.emplace_back(pebbles, kPebblesOptions);

@@ -197,6 +197,31 @@ class NurbsShape(unittest.TestCase):
         self.assertIn("make KIND [options] -o FILE\n       nurbs-shape make KIND [options] FILE\n",
                       call("make", "--help").stdout)
 
+    def test_usage_names_what_is_needed(self):
+        """What the usage line asks for is enough, and nothing of it may be left out."""
+        values = {"--axes": "3,2.5,2", "--radius": "2", "--length": "1", "--height": "2", "--rim": "0.2", "--cap": "3", "--blunt": "2",
+                  "--pointed": "3", "--rounding": "0.1", "--exponent": "3", "--equatorial": "2", "--polar": "1", "--count": "2",
+                  "--inertia": "1,0.9,0.8,0,0,0"}
+        one_of = {"inertia": ["--mass", "2"], "rounded-polyhedron": ["--solid", "cube"]}
+        text = call("make", "--help").stdout
+        kinds = re.findall(r"^  ([a-z-]+) {2,}", text[text.index("Subcommands:"):], re.MULTILINE)
+        needs = {kind: re.findall(r"--[a-z]+", call("make", kind, "--help").stdout.splitlines()[0]) for kind in kinds}
+        self.assertEqual(needs["tablet"], ["--radius", "--height", "--rim"])
+        self.assertEqual(needs["sphere"], [])
+        for kind, names in needs.items():
+            for left in [None, *names]:
+                words = [word for name in names if name != left for word in (name, values[name])]
+                run = call("make", kind, *words, *one_of.get(kind, []), "-o", str(self.file))
+                if left is None:
+                    self.assertEqual((run.returncode, run.stderr), (0, ""), kind)
+                else:
+                    self.assert_one_error(run, f"{left} is missing")
+
+    def test_pebbles_without_a_radius_say_that_it_is_1(self):
+        for words, said in ((["--radius", "0.004"], "radius 0.004\n"), ([], "radius 1 (the default: 1 m")):
+            run = call("make", "pebbles", "--count", "2", *words, "-o", str(self.file))
+            self.assertIn(said, run.stdout)
+
     def test_examples_of_help_work_as_written(self):
         import meshes
         points, faces = meshes.grain(1, 3, rough=0.25)
