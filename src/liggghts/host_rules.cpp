@@ -3,7 +3,9 @@
 
 #include <mpi.h>
 
+#include <algorithm>
 #include <cstring>
+#include <iterator>
 #include <string>
 
 #include "atom.h"
@@ -159,10 +161,7 @@ void warn_frozen_motion(LAMMPS* lmp, const Fix& fix, std::set<std::string>* told
 }
 
 void check_fix(LAMMPS* lmp, Fix* fix, std::set<std::string>* told) {
-  for (const Rule& rule : kRefused)
-    if (starts_with(fix->style, rule.prefix))
-      fail_all(FLERR, lmp,
-               std::string("Fix ") + fix->style + " can't be used with atom_style nurbs" + rule.instead);
+  refuse_fix(lmp, fix->style);
   for (const Rule& rule : kSpherical)
     if (starts_with(fix->style, rule.prefix))
       warn_once(lmp, told,
@@ -215,6 +214,18 @@ void refuse_pair_style(LAMMPS* lmp) {
   fail_all(FLERR, lmp,
            std::string("atom_style nurbs needs pair_style gran/nurbs; pair_style ") + lmp->force->pair_style +
                " takes the particles for spheres");
+}
+
+bool is_refused_fix(const std::string& style) {
+  return std::any_of(std::begin(kRefused), std::end(kRefused),
+                     [&](const Rule& rule) { return starts_with(style.c_str(), rule.prefix); });
+}
+
+void refuse_fix(LAMMPS* lmp, const char* style) {
+  for (const Rule& rule : kRefused)
+    if (starts_with(style, rule.prefix))
+      fail_all(FLERR, lmp,
+               std::string("Fix ") + style + " can't be used with atom_style nurbs" + rule.instead);
 }
 
 void check_host(LAMMPS* lmp, std::set<std::string>* told) {

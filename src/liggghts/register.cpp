@@ -30,6 +30,7 @@
 #include "output.h"
 #include "pair.h"
 // Classes first; below, the same list is read again for each kind of style with the host's macros.
+#include "liggghts/host_rules.h"
 #include "liggghts/styles.h"
 
 namespace {
@@ -88,6 +89,20 @@ template <class Style>
   return new Style(lmp, iarg, narg, arg);
 }
 
+// The host's own creators of fixes that NURBS particles refuse. Without this they would be refused when a run
+// begins, after the host's words on what is missing in them.
+FixMap& hosts_refused() {
+  static FixMap creators;
+  return creators;
+}
+
+Fix* create_unless_refused(LAMMPS* lmp, int narg, char** arg) {
+  const char* style = arg[2];
+  if (dynamic_cast<LAMMPS_NS::AtomVecNurbs*>(lmp->atom->avec) != nullptr)
+    LAMMPS_NS::nurbs_host::refuse_fix(lmp, style);
+  return hosts_refused().at(style)(lmp, narg, arg);
+}
+
 // Adds the styles to this LAMMPS instance's maps. Doing it twice does no harm: the last writer wins.
 void register_styles(LAMMPS* lmp) {
   [[maybe_unused]] auto& pairs = *lmp->force->pair_map;
@@ -103,6 +118,11 @@ void register_styles(LAMMPS* lmp) {
 #include "liggghts/styles.h"
 #undef FixStyle
 #undef FIX_CLASS
+  for (auto& [style, create] : fixes)
+    if (create != &create_unless_refused && LAMMPS_NS::nurbs_host::is_refused_fix(style)) {
+      hosts_refused()[style] = create;
+      create = &create_unless_refused;
+    }
 #define COMPUTE_CLASS
 #define ComputeStyle(key, Class) computes[#key] = &create_compute<LAMMPS_NS::Class>;
 #include "liggghts/styles.h"

@@ -60,6 +60,8 @@ class Hints(unittest.TestCase):
     def test_errors_say_what_to_write(self):
         for line, words in (
                 ("fix q all nve/sphere", "use fix nve/nurbs"),
+                ("fix q all wall/gran model hooke tangential history primitive type 1 zplane 0.0\nthermo_style custom step f_q[1]",
+                 "Fix wall/gran can't be used with atom_style nurbs; use fix wall/nurbs"),
                 ("compute q all erotate/sphere", "use compute erotate/nurbs"),
                 ("fix q all wall/nurbs primitive type 1 zplane 0.0", "write plane 0 0 C 0 0 1 type T"),
                 ("fix q all wall/nurbs plane 0 0 0 0 0 1", "or type T model NORMAL"),
