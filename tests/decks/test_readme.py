@@ -9,6 +9,7 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parent))
 import deck  # noqa: E402
+from test_walls import stl  # noqa: E402
 
 
 class Readme(unittest.TestCase):
@@ -21,6 +22,34 @@ class Readme(unittest.TestCase):
         self.assertGreater(len(list(result.path.glob("pebbles-*.vtu"))), 10)
         self.assertEqual(result.thermo["Atoms"][-1], 36)
         self.assertLess(result.thermo["KinEng"][-1], 2e6)  # 7e7 J in free fall: the floor holds them
+
+    def test_its_lines_from_a_deck_for_spheres(self):
+        """All of them in one deck, with the materials, the meshes and the box that they speak of: grains pour, and rolling counts."""
+        section = (deck.ROOT / "README.md").read_text().split("\n## From a deck for spheres\n")[1].split("\n## ")[0]
+        lines = re.findall(r"^    (.*)$", section, re.MULTILINE)
+        style = next(line for line in lines if line.startswith("atom_style"))
+        start = f"""units si
+newton off
+communicate single vel yes
+{style}
+boundary f f f
+region box block -0.06 0.06 -0.06 0.06 -0.01 0.12 units box
+create_box 1 box
+neighbor 2e-3 bin
+neigh_modify delay 0
+fix E all property/global youngsModulus peratomtype 5e6
+fix nu all property/global poissonsRatio peratomtype 0.3
+fix e all property/global coefficientRestitution peratomtypepair 1 0.5
+fix mu all property/global coefficientFriction peratomtypepair 1 0.5
+fix silo all mesh/surface file silo.stl type 1
+fix gravity all gravity 9.81 vector 0 0 -1
+"""
+        square = lambda h, z: stl([((-h, -h, z), (h, -h, z), (h, h, z)), ((-h, -h, z), (h, h, z), (-h, h, z))])  # noqa: E731
+        result = deck.run_ok(start + "\n".join(line for line in lines if line != style) +
+                             "\npair_coeff * *\ntimestep 2e-5\nrun 5000\n",
+                             files={"grain.json": deck.shape_file("pebble"), "silo.stl": square(0.01, 0.005), "face.stl": square(0.02, 0.06)})
+        self.assertEqual(re.findall(r"Fix wall/nurbs (\w+) has no rolling_friction", result.screen), ["wall", "tube"])
+        self.assertGreater(result.thermo["Atoms"][-1], 100)
 
     def test_its_restart_recipe(self):
         """What the README says to repeat after read_restart, and no more, goes on to the last bit."""
