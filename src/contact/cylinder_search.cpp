@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "contact/cylinder_follow.h"
+#include "contact/sphere_search.h"
 #include "nurbs/tolerances.h"
 
 namespace nurbs {
@@ -70,7 +72,7 @@ class Tube {
       if (moved < 1e-11 && std::abs(next.slope) < 1e-14 * particle_.scale * particle_.shape->bounding_radius)
         break;
     }
-    Reach best = low.value > high.value ? low : high;
+    Reach best = low.slope < -high.slope ? low : high;  // values near a maximum differ by round-off
     const double drop = low.slope - high.slope;
     if (low.slope > 0 && high.slope < 0 && drop > 0)
       best.on_body = low.on_body + low.slope / drop * (high.on_body - low.on_body);
@@ -113,7 +115,14 @@ void sample(const Tube& tube, const Reach& low, const Reach& high, double radius
   samples->at[samples->count++] = high;
 }
 
-void add_inside(const Tube& tube, const Reach& top, double radius, SurfaceContacts* out) {
+void add_found(const Particle& particle, const FeatureContact& f, SurfaceContacts* out) {
+  SurfaceContact c = surface_contact(f, 0);
+  c.memory = cylinder_memory(particle, f.where);
+  out->add(c);
+}
+
+void add_inside(const Particle& particle, const Tube& tube, const Reach& top, double radius,
+                SurfaceContacts* out) {
   if (!(top.value > radius)) return;
   FeatureContact f;
   f.touching = true;
@@ -121,7 +130,7 @@ void add_inside(const Tube& tube, const Reach& top, double radius, SurfaceContac
   f.normal = -tube.direction(top.angle).normalized();
   f.on_body = top.on_body;
   f.where = top.where;
-  out->add(surface_contact(f, 0));
+  add_found(particle, f, out);
 }
 
 // Returns what F is nowhere larger than, or infinity.
@@ -145,7 +154,7 @@ double find_inside(const Particle& particle, const Vec3& origin, const Vec3& axi
       other = tube.look(side * turn, &other);
     if (other.slope * side > 0) return HUGE_VAL;
     const Reach top = ahead.slope == 0 ? ahead : side > 0 ? tube.top(ahead, other) : tube.top(other, ahead);
-    add_inside(tube, top, radius, out);
+    add_inside(particle, tube, top, radius, out);
     return std::max(top.value * (1 + 1e-9), flattest);
   }
   // F < distance cos(angle) + size: elsewhere it stays below `level`.
@@ -175,12 +184,12 @@ double find_inside(const Particle& particle, const Vec3& origin, const Vec3& axi
     if (to.value > highest->value) highest = &to;
     if (from.slope > 0 && to.slope <= 0 && most_between(from, to) > radius) {
       const Reach top = tube.top(from, to);
-      if (least < std::min(last_top, top.value) - same) add_inside(tube, top, radius, out);
+      if (least < std::min(last_top, top.value) - same) add_inside(particle, tube, top, radius, out);
       last_top = least = top.value;
     }
     least = std::min(least, to.value);
   }
-  if (out->count == 0) add_inside(tube, *highest, radius, out);
+  if (out->count == 0) add_inside(particle, tube, *highest, radius, out);
   return samples.bound;
 }
 
@@ -201,26 +210,79 @@ void find_outside(const Particle& particle, const Vec3& origin, const Vec3& axis
     f = find_line_contact(particle, origin, axis, -side, d, radius, &g.where);
   else
     f = find_line_contact(particle, origin, axis, d, d, radius, &g.where);
-  if (f.touching) out->add(surface_contact(f, 0));
+  if (f.touching) add_found(particle, f, out);
+}
+
+// A body that is a ball, by the line of centres.
+void touch_ball(const Particle& particle, const CylinderPose& pose, SurfaceContacts* out) {
+  const double r = particle.scale * roundness(*particle.shape).radius, distance = pose.apart.norm();
+  SurfaceContact c;
+  c.gap = pose.side * (pose.radius - distance) - r;
+  if (!(c.gap < 0)) return;
+  c.normal = -pose.side / distance * pose.apart;
+  c.on_body = -r * c.normal;
+  c.triangle = 0;
+  c.rung = Rung::local_model;
+  c.memory = cylinder_memory(particle, {});
+  out->add(c);
+}
+
+// Goes on with one of the last step's contacts, where the body has no other.
+bool go_on(const Particle& particle, const CylinderPose& pose, const ContactSettings& settings,
+           const FormerContact* former, int former_count, SurfaceContact* c) {
+  for (int k = 0; k < former_count; ++k) {
+    PairMemory memory = *former[k].memory;
+    CylinderContact next;
+    if (!follow_on_cylinder(particle, pose, settings, &memory, &next)) continue;
+    *c = SurfaceContact{};
+    c->gap = next.gap;
+    c->normal = next.normal;
+    c->on_body = next.on_body;
+    c->triangle = 0;
+    c->rung = next.rung;
+    c->iterations = next.iterations;
+    c->memory = memory;
+    return true;
+  }
+  return false;
 }
 
 }  // namespace
 
 void find_cylinder_contacts(const Particle& particle, const Vec3& origin, const Vec3& axis, double radius,
-                            double path, SurfaceContacts* out) {
+                            const ContactSettings& settings, double path, const FormerContact* former,
+                            int former_count, SurfaceContacts* out) {
   out->count = 0;
   out->full = false;
   out->expiry = -kFarAway;
   const Vec3 apart = particle.x - origin, across = apart - apart.dot(axis) * axis;
   const double distance = across.norm(), size = particle.scale * particle.shape->bounding_radius;
   const double clear = std::max(radius - distance, distance - radius) - size;
-  if (clear > 0) {
-    out->expiry = path + (1 - 1e-12) * clear;
+  const auto keep_away = [&](double gap) {
+    if (gap > 0) out->expiry = path + (1 - 1e-12) * gap;
+  };
+  if (clear > 0) return keep_away(clear);
+  const CylinderPose pose{axis, across, radius, distance < radius ? 1.0 : -1.0};
+  // F'' = (curvature radius of the body's outline) - F: where the body is everywhere more curved than the
+  // tube, F has one maximum above the radius, if any.
+  const double flattest = particle.scale * particle.shape->patch_curvature.max_radius;
+  const bool alone = pose.side < 0 || (flattest < radius && !particle.shape->dented());
+  SurfaceContact next;
+  if (alone && distance > kLevel * (size + apart.norm()) &&
+      is_round(particle, settings.tolerance * size, settings.tolerance)) {
+    touch_ball(particle, pose, out);
     return;
   }
-  if (distance < radius) {
+  if (alone && go_on(particle, pose, settings, former, former_count, &next)) {
+    if (next.gap < 0)
+      out->add(next);
+    else
+      keep_away(pose.side > 0 ? std::min(next.gap - 1e-9 * radius, radius - flattest) : 0);
+    return;
+  }
+  if (pose.side > 0) {
     const double most = find_inside(particle, origin, axis, radius, out);
-    if (out->count == 0 && most < radius) out->expiry = path + (1 - 1e-12) * (radius - most);
+    if (out->count == 0) keep_away(radius - most);
   } else {
     find_outside(particle, origin, axis, radius, out);
   }

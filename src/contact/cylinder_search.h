@@ -16,6 +16,7 @@ namespace nurbs {
 // inside a tube whose radius is less than one of the body's radii of curvature, or where it has flats: maxima
 // closer than 2e-3 rad, or than a fiftieth of the body on the wall, are then found as one.
 void find_cylinder_contacts(const Particle& particle, const Vec3& origin, const Vec3& axis, double radius,
-                            double path, SurfaceContacts* out);
+                            const ContactSettings& settings, double path, const FormerContact* former,
+                            int former_count, SurfaceContacts* out);
 
 }  // namespace nurbs

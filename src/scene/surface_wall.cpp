@@ -129,7 +129,8 @@ void SurfaceWall::find_for(int body, const ContactStages::Step& step,
   const Particle particle = step.bodies->particle(body);
   if (!finite(particle)) return stages->give(body, head, nullptr, 0);
   if (kind_ == Kind::cylinder)
-    find_cylinder_contacts(particle, origin_, axis_, radius_, step.bodies->path()[body] + path_, &contacts_);
+    find_cylinder_contacts(particle, origin_, axis_, radius_, step.settings,
+                           step.bodies->path()[body] + path_, former, formers, &contacts_);
   else
     find_in_mesh(body, step, meshes, former, formers);
   expiry_[body] = contacts_.expiry;

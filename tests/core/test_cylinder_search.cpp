@@ -1,5 +1,6 @@
-// Bodies in a tube: contacts are the maxima of the reach that dense sampling finds, and a body that touches
-// nothing is told how far it is from the wall.
+// Bodies in a tube: contacts are the maxima of the reach that dense sampling finds, a body that touches
+// nothing is told how far it is from the wall, and a contact that is followed from step to step is the one
+// that a search from scratch finds.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -49,7 +50,7 @@ TEST(CylinderSearch, contacts_inside_are_the_maxima_of_the_reach) {
     const std::vector<double> f = reaches(p, origin, u, v);
     const double most = *std::max_element(f.begin(), f.end()), coarse = radius * std::pow(M_PI / kAround, 2);
     SurfaceContacts found;
-    find_cylinder_contacts(p, origin, axis, radius, 5, &found);
+    find_cylinder_contacts(p, origin, axis, radius, {}, 5, nullptr, 0, &found);
     if (std::abs(most - radius) < 2 * coarse) continue;
     SCOPED_TRACE(shape.name + " " + std::to_string(n));
     ASSERT_EQ(found.count > 0, most > radius);
@@ -116,16 +117,133 @@ TEST(CylinderSearch, a_round_body_on_the_axis_of_a_narrower_tube_has_one_contact
     const double reach = -gap_along(p, origin, -axis.unitOrthogonal(), nullptr).gap, radius = 0.97 * reach;
     SCOPED_TRACE(shape.name + " " + std::to_string(n));
     SurfaceContacts found;
-    find_cylinder_contacts(p, origin, axis, radius, 5, &found);
+    find_cylinder_contacts(p, origin, axis, radius, {}, 5, nullptr, 0, &found);
     ASSERT_EQ(found.count, 1);
     EXPECT_NEAR(found.contact[0].gap, radius - reach, 1e-12 * reach);
     const Vec3 aside = axis.unitOrthogonal();
     p.x += 1e-6 * reach * aside;
-    find_cylinder_contacts(p, origin, axis, radius, 5, &found);
+    find_cylinder_contacts(p, origin, axis, radius, {}, 5, nullptr, 0, &found);
     ASSERT_EQ(found.count, 1);
     EXPECT_NEAR(found.contact[0].gap, radius - (1 + 1e-6) * reach, 1e-12 * reach);
     EXPECT_NEAR(-found.contact[0].normal.dot(aside), 1, 1e-8);
   }
+}
+
+// What a wall keeps of a body from step to step.
+class Follower {
+ public:
+  void find(const Particle& p, const Vec3& origin, const Vec3& axis, double radius, SurfaceContacts* out) {
+    FormerContact former[kSurfaceContacts];
+    const int count = last_.count;
+    for (int k = 0; k < count; ++k) former[k] = {last_.contact[k].normal, &last_.contact[k].memory, false};
+    find_cylinder_contacts(p, origin, axis, radius, ContactSettings{}, 5, former, count, out);
+    last_ = *out;
+  }
+
+ private:
+  SurfaceContacts last_;
+};
+
+// A body that is turned and moved about by 1e-7 to 0.1 rad a step, in spells, through contact and out of it.
+class Tumbling {
+ public:
+  Tumbling(Random& random, const Shape& shape, double side) : random_(random), side_(side) {
+    p.shape = &shape;
+    p.scale = random.log_uniform(0.01, 100);
+    p.q = random.turn();
+    size = p.scale * shape.bounding_radius;
+    radius = size * (side > 0 ? random.log_uniform(1.3, 40) : random.log_uniform(0.05, 20));
+    axis = random.direction();
+    origin = size * random.box(-3, 3);
+    ahead_ = axis.unitOrthogonal();
+  }
+
+  void step() {
+    if (left_-- <= 0) {
+      left_ = random_.whole(3, 12);
+      turn_ = random_.below(4) ? random_.log_uniform(1e-7, 0.1) : 0;
+      about_ = random_.direction();
+      to_ = size * (random_.below(4) ? -random_.log_uniform(1e-7, 2e-2) : random_.log_uniform(1e-6, 1e-3));
+      if (random_.below(3) == 0) gap_ = to_;
+    }
+    gap_ += 0.3 * (to_ - gap_);
+    p.q = (Quat(Eigen::AngleAxisd(turn_, about_)) * p.q).normalized();
+    ahead_ = Eigen::AngleAxisd(turn_ * size / radius, axis) * ahead_;
+    along_ += 0.1 * turn_ * size;
+    p.x = Vec3::Zero();
+    const double reach = -gap_along(p, Vec3::Zero(), -side_ * ahead_, nullptr).gap;
+    p.x = origin + along_ * axis + (radius - side_ * (reach + gap_)) * ahead_;
+  }
+
+  // An upper bound of the gap.
+  double apart() const { return std::max(0.0, gap_); }
+
+  Particle p;
+  Vec3 origin, axis;
+  double radius, size;
+
+ private:
+  Random& random_;
+  const double side_;
+  Vec3 ahead_, about_;
+  double turn_ = 0, gap_ = 0, to_ = 0, along_ = 0;
+  int left_ = 0;
+};
+
+// Contacts as a search from scratch finds them, to the default tolerance. One that is shallower than it may
+// be missing.
+void expect_same(const SurfaceContacts& found, const SurfaceContacts& reference, const Tumbling& body) {
+  const double allowed = 2e-9 * body.size;
+  for (const bool back : {false, true}) {
+    const SurfaceContacts &one = back ? reference : found, &other = back ? found : reference;
+    for (int k = 0; k < one.count; ++k) {
+      const SurfaceContact& c = one.contact[k];
+      double nearest = HUGE_VAL;
+      const SurfaceContact* same = nullptr;
+      for (int j = 0; j < other.count; ++j) {
+        const double apart = (other.contact[j].normal - c.normal).norm();
+        if (apart < nearest) nearest = apart, same = &other.contact[j];
+      }
+      if (same == nullptr) {
+        EXPECT_LT(-c.gap, allowed) << (back ? "lost" : "made up");
+        continue;
+      }
+      EXPECT_NEAR(c.gap, same->gap, allowed);
+      EXPECT_LT(nearest, 1e-8);
+      EXPECT_LT((c.on_body - same->on_body).norm(), 1e-6 * body.size);
+    }
+  }
+  if (found.count == 0) {
+    EXPECT_LE(found.expiry - 5, (1 + 1e-6) * body.apart());
+  }
+}
+
+TEST(CylinderSearch, contacts_of_round_bodies_are_followed) {
+  Random random(9);
+  int touching = 0, followed = 0, modelled = 0;
+  const ShapePointer shapes[] = {sphere(), ellipsoid(), closed_ellipsoid(), smooth_pebble(), polar(), disc()};
+  for (int n = 0; n < 240; ++n) {
+    const Shape& shape = *shapes[n % 6];
+    Tumbling body(random, shape, n % 4 == 3 ? -1 : 1);
+    Follower follower;
+    for (int k = 0; k < 60; ++k) {
+      body.step();
+      SCOPED_TRACE(shape.name + " " + std::to_string(n) + " step " + std::to_string(k));
+      SurfaceContacts found, reference;
+      follower.find(body.p, body.origin, body.axis, body.radius, &found);
+      find_cylinder_contacts(body.p, body.origin, body.axis, body.radius, {}, 5, nullptr, 0, &reference);
+      expect_same(found, reference, body);
+      for (int j = 0; j < found.count; ++j) {
+        ++touching;
+        followed += found.contact[j].iterations > 0;
+        modelled += found.contact[j].rung == Rung::local_model;
+      }
+      if (HasFailure()) return;
+    }
+  }
+  EXPECT_GT(touching, 6000);
+  EXPECT_GT(followed, 0.2 * touching);
+  EXPECT_GT(modelled, 0.4 * touching);
 }
 
 }  // namespace
