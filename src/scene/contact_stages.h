@@ -272,7 +272,7 @@ class ContactStages {
                std::int32_t* number) const;
   void inherit(std::int32_t number, int body, const Former* former, int formers, const WallContact& found);
   void count_listed(const WallContact& found, std::int32_t number, int body);
-  void update_listed(std::int32_t number, int body, const WallContact& found);
+  void update_listed(std::int32_t number, int body, const WallContact& found, bool known);
 
   // What contacts that take each other's place hold: wall_energy.cpp.
   struct Holding;

@@ -10,7 +10,7 @@ namespace nurbs {
 namespace {
 
 constexpr double kSameSide = 0.7;             // cosine between normals: 45 degrees
-constexpr int kListedSize = 10 + kProofSize;  // doubles of a listed contact beside its record: see pack_list
+constexpr int kListedSize = 16 + kProofSize;  // doubles of a listed contact beside its record: see pack_list
 
 }  // namespace
 
@@ -61,14 +61,16 @@ int ContactStages::former(std::int32_t head, Vec3* normals, PairMemory* memories
 }
 
 // What the contact is in this step, but for its state of the law.
-void ContactStages::update_listed(std::int32_t number, int body, const WallContact& found) {
+void ContactStages::update_listed(std::int32_t number, int body, const WallContact& found, bool known) {
   Partner& p = partner(number);
   ContactBlock& block = pool_.block(number);
   const int lane = ContactPool::lane(number);
   const Vec3 x = load(p.record.x);
-  store(Vec3(found.velocity - found.spin.cross(found.result.point_a - x)), p.record.velocity);
-  store(found.spin, p.record.spin);
-  store(found.spin, p.record.spin_before);
+  if (!known || !step_.setup || step_.changed) {  // before a run begins, a wall's motion may not be there yet
+    store(Vec3(found.velocity - found.spin.cross(found.result.point_a - x)), p.record.velocity);
+    store(found.spin, p.record.spin);
+    store(found.spin, p.record.spin_before);
+  }
   p.mark = found.mark;
   p.region = found.region;
   store(load(step_.bodies->record(body).x), p.body);
@@ -189,7 +191,7 @@ void ContactStages::give(int body, std::int32_t* head, WallContact* found, int c
       block.set(lane, kLocalModelSize, 10, &f.memory.on_a);
     }
     partner(n).proof.contact = n;
-    update_listed(n, body, f);
+    update_listed(n, body, f, known[k]);
     count_listed(f, n, body);
     if (!known[k] && reentrant && !step_.setup) inherit(n, body, former, formers, f);
   }
@@ -289,7 +291,9 @@ int ContactStages::pack_list(std::int32_t head, double* to) const {
     std::memcpy(to + m + 7, &p.name, sizeof p.name);
     to[m + 8] = p.level;
     to[m + 9] = p.shift;
-    std::memcpy(to + m + 10, &p.proof, sizeof p.proof);
+    std::memcpy(to + m + 10, p.record.velocity, 3 * sizeof(double));
+    std::memcpy(to + m + 13, p.record.spin, 3 * sizeof(double));
+    std::memcpy(to + m + 16, &p.proof, sizeof p.proof);
     m += kListedSize;
     m += pool_.pack(head, to + m);
   }
@@ -313,7 +317,10 @@ std::int32_t ContactStages::unpack_list(const double* from, int* size) {
     std::memcpy(&p.name, values + 7, sizeof p.name);
     p.level = values[8];
     p.shift = values[9];
-    std::memcpy(&p.proof, values + 10, sizeof p.proof);
+    std::memcpy(p.record.velocity, values + 10, 3 * sizeof(double));
+    std::memcpy(p.record.spin, values + 13, 3 * sizeof(double));
+    std::memcpy(p.record.spin_before, values + 13, 3 * sizeof(double));
+    std::memcpy(&p.proof, values + 16, sizeof p.proof);
     p.proof.contact = number;
     if (last == 0)
       first = number;

@@ -411,6 +411,25 @@ class MovingWalls(unittest.TestCase):
                     start="newton off\ncommunicate single vel yes\nread_restart half.rst\n")
         np.testing.assert_allclose(last(other), last(one), rtol=0, atol=1e-9)
 
+    def test_capsules_on_a_bent_mesh_in_motion_are_the_same_across_restarts(self):
+        """What a contact that ends hands on is told by the wall's velocity too, which goes along to other ranks and files."""
+        random, bodies, thrown = np.random.RandomState(5), [], []
+        for k in range(12):
+            turn = random.normal(size=4)
+            bodies.append((k + 1, 1, 1, 0.02, 2500.0, -0.09 + 0.06 * (k % 4), -0.06 + 0.06 * (k // 4), 0.05, *(turn / np.linalg.norm(turn))))
+            thrown.append((k + 1, *random.uniform(-0.3, 0.3, 2), -0.5, *random.normal(size=3) * 5))
+        options = dict(mesh=bumpy(7, 3e-3, 16), body=deck.shape_file("capsule", radius=1, length=2), law="kn 1e5 kt 5e4 cn 30 ct 10 mu 0.3",
+                       before=MESH, after="dump_modify d every 20\n"
+                       "fix mv all move/mesh mesh m wiggle amplitude 0.004 0.002 0.003 period 0.01")
+        run_ = functools.partial(run, "mesh m", bodies, thrown, **options)
+        parts, steps = 8, 20
+        whole = run_(steps="run 3000\n" + "".join(f"write_restart {k}.rst\nrun {steps}\n" for k in range(parts)))
+        then = [[list(column) for column in columns.values()] for step, columns in whole.dump("out.dump") if step >= 3000]
+        for k in range(parts):
+            rest = run("mesh m", steps=f"run {steps}", ranks=2 if k == 7 else 1, files={f"{k}.rst": whole.path / f"{k}.rst"},
+                       start=f"newton off\ncommunicate single vel yes\nread_restart {k}.rst\n", **options)
+            self.assertEqual(last(rest), then[k + 1], k)
+
     def test_a_restart_into_a_wall_of_another_kind(self):
         """A floor that lay still is given again so that it moves, or as a mesh, and back: contacts begin anew, which is said."""
         floor = "plane 0 0 0 0 0 1"
