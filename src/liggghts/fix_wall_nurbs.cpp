@@ -110,7 +110,11 @@ int FixWallNurbs::parse_mesh(int narg, char** arg) {
   for (; k < narg && !begins_law(arg[k]); ++k) {
     const std::string name = arg[k];
     Fix* fix = modify->find_fix_id(arg[k]);
-    if (fix == nullptr) fail_all(FLERR, lmp, "Fix wall/nurbs mesh: there is no fix " + name);
+    if (fix == nullptr)
+      fail_all(FLERR, lmp,
+               "Fix wall/nurbs mesh: there is no fix " + name +
+                   (name == "n_meshes" || name == "meshes" ? "; for mesh n_meshes 1 meshes ID write mesh ID"
+                                                           : ""));
     if (dynamic_cast<FixMeshSurface*>(fix) == nullptr)
       fail_all(FLERR, lmp,
                "Fix wall/nurbs mesh: fix " + name + " is a " + fix->style + "; it must be a mesh/surface");
@@ -134,6 +138,9 @@ int FixWallNurbs::parse_mesh(int narg, char** arg) {
 // Reads `move` and its words, and puts them behind all others; how many these are.
 int FixWallNurbs::parse_motion(int narg, char** arg) {
   for (int k = 3; k < narg; ++k) {
+    if (kind_ != Kind::mesh && std::strcmp(arg[k], "shear") == 0)
+      fail_all(FLERR, lmp,
+               "Fix wall/nurbs: for shear write move linear VX VY VZ, along a wall that stays where it is");
     if (std::strcmp(arg[k], "move") != 0) continue;
     if (kind_ == Kind::mesh)
       fail_all(FLERR, lmp,

@@ -45,6 +45,7 @@ constexpr Rule kRefused[] = {{"wall/gran", "; use fix wall/nurbs"},
                              {"multisphere", "; use fix nve/nurbs"},
                              {"concave", "; use fix nve/nurbs"},
                              {"multicontact", ""},
+                             {"massflow/mesh/sieve", "; use fix wall/nurbs mesh and fix massflow/mesh"},
                              {"heat/gran", ""},
                              {"sph/", ""},
                              {"insert/stream/predefined", "; use fix insert/stream"}};

@@ -64,6 +64,8 @@ class Hints(unittest.TestCase):
                  "Fix wall/gran can't be used with atom_style nurbs; use fix wall/nurbs"),
                 ("compute q all erotate/sphere", "use compute erotate/nurbs"),
                 ("fix q all wall/nurbs primitive type 1 zplane 0.0", "write plane 0 0 C 0 0 1 type T"),
+                ("fix q all wall/nurbs mesh n_meshes 1 meshes m type 1 model hertz", "write mesh ID"),
+                ("fix q all wall/nurbs plane 0 0 0 0 0 1 type 1 model hertz shear x 0.1", "write move linear VX VY VZ"),
                 ("fix q all wall/nurbs plane 0 0 0 0 0 1", "or type T model NORMAL"),
                 ("compute q all wall/gran/local id force", "use compute nurbs/local, whose id2 is 0 at walls"),
                 ("run 1\npair_style gran model hertz tangential history", "pair_style gran takes the particles for spheres"),
@@ -342,6 +344,7 @@ class Refused(unittest.TestCase):
                 ("fix motion all nve/limit radius_ratio 0.1", "fix nve/nurbs"), ("fix motion all nve/sphere", "sphere"),
                 ("fix motion all rigid single", "rigid", "fix nve/nurbs"),
                 ("variable d equal 2\nfix a all adapt 1 atom diameter v_d", "Fix adapt a", "nurbs/scale"),
+                ("fix s all massflow/mesh/sieve mesh m", "massflow/mesh/sieve", "fix massflow/mesh"),
                 (f"fix w all wall/gran {plane}", "Fix wall/gran", "fix wall/nurbs"),
                 ("region r block -6 6 -6 6 0 12\nfix w all wall/region r lj126 1 1 2", "Fix wall/region", "fix wall/nurbs")):
             text = DECK.replace("fix motion all nve/nurbs", "") if "fix motion" in command else DECK
