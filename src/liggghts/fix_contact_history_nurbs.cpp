@@ -285,8 +285,10 @@ void FixContactHistoryNurbs::write_restart(FILE* file) {
   const nurbs::EnergyLedger done = serves_nurbs() ? pair()->stages().dissipated() : nurbs::EnergyLedger{};
   double mine[2] = {done.damping, done.friction}, all[2] = {0, 0};
   MPI_Reduce(mine, all, 2, MPI_DOUBLE, MPI_SUM, 0, world);
+  const std::uint64_t print = serves_nurbs() ? pair()->last_fingerprint() : 0;
   if (comm->me != 0) return;
-  const double list[] = {static_cast<double>(dnum_), static_cast<double>(maxtouch_), all[0], all[1]};
+  double list[] = {static_cast<double>(dnum_), static_cast<double>(maxtouch_), all[0], all[1], 0};
+  std::memcpy(list + 4, &print, sizeof print);
   const int size = sizeof list;
   std::fwrite(&size, sizeof size, 1, file);
   std::fwrite(list, sizeof list, 1, file);
@@ -296,6 +298,9 @@ void FixContactHistoryNurbs::restart(char* buffer) {
   FixContactHistory::restart(buffer);
   if (!serves_nurbs()) return;
   const double* list = reinterpret_cast<const double*>(buffer);
+  std::uint64_t print = 0;
+  std::memcpy(&print, list + 4, sizeof print);
+  pair()->go_on_from(print);
   nurbs::EnergyLedger& done = pair()->stages().dissipated();
   done = nurbs::EnergyLedger{};
   if (comm->me != 0) return;

@@ -281,13 +281,16 @@ void PairGranNurbs::hand_in_neighbours() {
   stages_.end_neighbours();
 }
 
-// Of all ranks: motion and mass of every body, in whatever order, and what contacts are computed with.
+// Of all ranks: motion and mass of every body, and what contacts are computed with, in whatever order.
 // Positions are not in it, which wrap; contacts see themselves whether bodies have been moved.
 std::uint64_t PairGranNurbs::fingerprint() const {
   const auto add = [](double value, std::uint64_t* to) {
     *to = nurbs::body_stamp(*to, value + 0.0);  // -0 is 0
   };
   std::uint64_t mine = 0, all = 0, rest = 1;
+  int frozen = 0;
+  for (int k = 0; k < modify->nfix; ++k)
+    if (std::strcmp(modify->fix[k]->style, "freeze") == 0) frozen |= modify->fix[k]->groupbit;
   for (int i = 0; i < atom->nlocal; ++i) {
     std::uint64_t body = static_cast<std::uint64_t>(atom->tag[i]);
     for (int k = 0; k < 3; ++k) {
@@ -296,19 +299,28 @@ std::uint64_t PairGranNurbs::fingerprint() const {
     }
     add(atom->rmass[i], &body);
     add(atom->type[i], &body);
-    add(atom->mask[i] & freeze_group_bit_, &body);
+    add((atom->mask[i] & frozen) != 0, &body);
     mine += body;
   }
   MPI_Allreduce(&mine, &all, 1, MPI_UINT64_T, MPI_SUM, world);
-  for (const nurbs::ContactCoefficients& law : law_table_)
+  for (const Law& given : laws_) {
+    const nurbs::ContactCoefficients law = given ? *given : nurbs::ContactCoefficients{};
     for (const double value : {law.kn, law.kt, law.cn, law.ct, law.mu}) add(value, &rest);
+  }
   for (int k = 0; k < modify->nfix; ++k)
     if (auto* property = dynamic_cast<FixPropertyGlobal*>(modify->fix[k])) {
-      for (int n = 0; n < property->size_vector; ++n) add(property->compute_vector(n), &rest);
+      std::uint64_t own = 1;
+      for (const char* c = property->id; *c != '\0'; ++c) add(*c, &own);
+      for (int n = 0; n < property->size_vector; ++n) add(property->compute_vector(n), &own);
       for (int n = 0; n < property->size_array_rows; ++n)
-        for (int m = 0; m < property->size_array_cols; ++m) add(property->compute_array(n, m), &rest);
+        for (int m = 0; m < property->size_array_cols; ++m) add(property->compute_array(n, m), &own);
+      all += own;
     }
   return nurbs::mix(all + rest) | 1;
+}
+
+std::uint64_t PairGranNurbs::last_fingerprint() const {
+  return update->whichflag != 0 ? fingerprint() : fingerprint_;
 }
 
 void PairGranNurbs::compute_force(int eflag, int vflag, int addflag) {

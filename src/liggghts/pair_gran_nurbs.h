@@ -74,6 +74,9 @@ class PairGranNurbs : public PairGran {
   // bodies move or what they are made of, so that forces at the start of the next run are not those of the
   // end of the last. `as_at_end`: that nobody has yet. Collective.
   void end_run() { fingerprint_ = fingerprint(); }
+  // The same for restarts, which may be written within a run. Collective.
+  std::uint64_t last_fingerprint() const;
+  void go_on_from(std::uint64_t fingerprint) { fingerprint_ = fingerprint; }
   void warn_deep_run();
   bool as_at_end() const { return fingerprint_ != 0 && fingerprint() == fingerprint_; }
   bool changed() const { return changed_; }

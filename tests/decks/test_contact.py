@@ -137,6 +137,17 @@ run 0
             if wanted:
                 self.assertAlmostEqual(got, wanted, delta=0.1)
         self.assertEqual(forces[-1], forces[-2])
+        # The same between a restart and its first run, whether it was written between runs or within one.
+        written = deck_text[:deck_text.index("velocity b set -1")]
+        for steps in ("run 1\nwrite_restart a.restart\n", "restart 1 a.restart\nrun 1\n"):
+            first = deck.run_ok(written.replace("run 1\nrun 0\n", steps).replace("run 1\n", steps, 1), files=files())
+            place = first.path / ("a.restart" if "write" in steps else "a.restart.1")
+            again = ("newton off\natom_modify map array\nread_restart a\ncommunicate single vel yes\ngroup b id 2\nneighbor 0.3 bin\n"
+                     "neigh_modify delay 0\n" + deck_text[deck_text.index("fix motion"):deck_text.index("run 1\n")])
+            for change, expected in (("", 2000), ("velocity b set -1 0 0 units box\n", 3000), ("velocity b set 1 0 0 units box\n", 1000)):
+                for ranks in (1, 2):
+                    run = deck.run_ok(again + change + "run 0\n", ranks=ranks, files={"a": place})
+                    self.assertAlmostEqual(run.thermo["fx"][0], expected, delta=0.1)
 
 
 class Ledger(unittest.TestCase):
