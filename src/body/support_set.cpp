@@ -72,6 +72,14 @@ void set_point(SupportSet& set, int i, const Vec3& point, int vertex) {
   set.vertex[i] = vertex;
 }
 
+// The end of a neighbour's rulings that lies next to a surface point: rounded edges have their support beside
+// the lines that they end.
+bool beside_ruling(const Shape& shape, const EdgeLink& link) {
+  const Ruling ruling = shape.flats.ruling[link.patch];
+  return ruling != Ruling::none &&
+         (link.edge == end_edge(ruling, false) || link.edge == end_edge(ruling, true));
+}
+
 }  // namespace
 
 bool ruled_line(const Shape& shape, const SurfacePoint& at, const Vec3& d, double angle, RuledLine* line) {
@@ -87,8 +95,10 @@ bool ruled_line(const Shape& shape, const SurfacePoint& at, const Vec3& d, doubl
   for (int edge = 0; edge < 4; ++edge) {
     const double off = edge == 0 ? at.u : edge == 1 ? 1 - at.u : edge == 2 ? at.v : 1 - at.v;
     const EdgeLink& link = shape.links[at.patch][edge];
-    if (off > kBesideJoint || link.patch < 0 || link.collapsed) continue;
-    try_at(across(shape.patches, link, at, edge));
+    if (link.patch < 0 || link.collapsed || (off > kBesideJoint && !beside_ruling(shape, link))) continue;
+    SurfacePoint on_edge = at;
+    (edge < 2 ? on_edge.u : on_edge.v) = edge % 2;
+    try_at(across(shape.patches, link, on_edge, edge));
   }
   return best > -std::numeric_limits<double>::infinity();
 }

@@ -17,6 +17,12 @@ constexpr double kLineAngle = 0.8;   // rad, the same for the normal of a ruled 
 constexpr double kThinnest = 1e-7;   // width to length of a polygon below which it is a segment
 constexpr double kInfinite = std::numeric_limits<double>::infinity();
 
+// Rooms by which a polygon is looked for to be out of reach, in smaller bounding radii, widest first; and the
+// share of one that bodies may go: reach and overlap grow by up to five times the way, heights on inclined
+// faces change by more than it.
+constexpr double kRooms[] = {0.3, 0.03, 3e-3};
+constexpr double kWayShare = 0.1;
+
 void store(const Vec3& v, double* out) {
   for (int k = 0; k < 3; ++k) out[k] = v[k];
 }
@@ -178,21 +184,44 @@ class FaceContact {
 
   double deepest_gap() const { return gap_below(incident_, plane_); }
 
+  // Whether make() must fail as long as no point of either body goes further than `room` (length): of all
+  // that may then lie over the reference face, some that is sure to is higher than `most`.
+  bool is_out_of_reach(double most, double room) {
+    set_window();
+    const Vec2 centre = polygon_centroid(window_);
+    ConvexPolygon middle;
+    middle.add(centre, 0, 0);
+    const double inner_radius = depth_inside(window_, middle);
+    if (!(inner_radius > room)) return false;
+    const auto scaled = [&](double by) {
+      ConvexPolygon p = window_;
+      for (int i = 0; i < p.count; ++i) p.corner[i] = centre + by * (p.corner[i] - centre);
+      return p;
+    };
+    const Windows windows{scaled(1 + room / inner_radius), scaled(1 - room / inner_radius)};
+    if (face_may_be_near(windows, most)) return false;
+    for (const StraightEdge& edge : incident_.shape->flats.edges)
+      if (segment_may_be_near(windows, {incident_.vertex(edge.ends[0]), incident_.vertex(edge.ends[1])},
+                              most))
+        return false;
+    RuledLine line;
+    return !incident_line(&line) || !segment_may_be_near(windows, line.ends, most);
+  }
+
   // `swallowed`: the reference face lies inside the incident one.
   bool make(double overlap, double reach, ContactPolygon* out, bool* swallowed) {
-    for (const int v : face_.outline)
-      window_.add(plane_.project(reference_.place(reference_.vertex(v))), 0, 0);
+    set_window();
     *swallowed = false;
     const double most = reach - overlap;
     if (!face_points(most, swallowed) && !crease_points(most) && !line_points(most)) return false;
     if (!finish(points_, reach, nullptr, out)) return false;
     out->reference = reference_.index;
-    out->rolling = rolling_;
     if (whole_ && ring_ >= 0) set_ring(*incident_.shape, incident_.index, ring_, out);
     out->factor = 1;
     store(face_.normal, out->normal);
     out->offset = face_.offset;
     set_marks(reference_.frame, incident_.frame, out);
+    out->rolling = ruled_ ? 1 : 0;
     set_room(out);
     return true;
   }
@@ -203,24 +232,75 @@ class FaceContact {
                                  : crossing_id(side_of_incident, side_of_reference);
   }
 
-  bool face_points(double most, bool* swallowed) {
-    const FlatFeatures& flats = incident_.shape->flats;
-    const int f = nearest_face(flats, incident_.turned_back(-plane_.normal), kFaceCosine);
-    if (f < 0) return false;
-    const FlatFace& face = flats.faces[f];
-    // Counterclockwise seen from the incident body's outside is clockwise about the reference's normal.
+  void set_window() {
+    window_.count = 0;
+    for (const int v : face_.outline)
+      window_.add(plane_.project(reference_.place(reference_.vertex(v))), 0, 0);
+  }
+
+  // The incident face opposite the reference, in the reference plane.
+  struct Opposite {
+    int face;  // -1: none
+    Vec3 normal;
+    double level;
+    ConvexPolygon outline;
+  };
+  // Counterclockwise seen from the incident body's outside is clockwise about the reference's normal.
+  static int vertex(const FlatFace& face, int i) {
     const int n = static_cast<int>(face.outline.size());
-    const auto vertex = [&](int i) { return face.outline[n - 1 - i % n]; };
-    ConvexPolygon subject;
-    for (int i = 0; i < n; ++i)
-      subject.add(plane_.project(incident_.place(incident_.vertex(vertex(i)))), 0, 0);
-    const ConvexPolygon cut = intersect(subject, window_, slack_);
+    return face.outline[n - 1 - i % n];
+  }
+  Opposite opposite() const {
+    Opposite o;
+    const FlatFeatures& flats = incident_.shape->flats;
+    o.face = nearest_face(flats, incident_.turned_back(-plane_.normal), kFaceCosine);
+    if (o.face < 0) return o;
+    const FlatFace& face = flats.faces[o.face];
+    for (int i = 0; i < static_cast<int>(face.outline.size()); ++i)
+      o.outline.add(plane_.project(incident_.place(incident_.vertex(vertex(face, i)))), 0, 0);
+    o.normal = incident_.turned(face.normal);
+    o.level = incident_.frame.scale * face.offset - o.normal.dot(plane_.origin - incident_.frame.x);
+    return o;
+  }
+  // Of the incident face over a place of the reference plane.
+  double height(const Opposite& o, const Vec2& at) const {
+    return (o.level - at[0] * o.normal.dot(plane_.u) - at[1] * o.normal.dot(plane_.v)) /
+               o.normal.dot(plane_.normal) -
+           plane_.level;
+  }
+
+  // What surely contains, and what surely is part of, the reference face wherever it goes.
+  struct Windows {
+    ConvexPolygon wide, narrow;
+  };
+  bool face_may_be_near(const Windows& windows, double most) const {
+    const Opposite o = opposite();
+    if (o.face < 0 || intersect(o.outline, windows.wide, slack_).count < 3) return false;
+    const ConvexPolygon cut = intersect(o.outline, windows.narrow, slack_);
+    return std::none_of(cut.corner, cut.corner + cut.count,
+                        [&](const Vec2& at) { return height(o, at) > most; });
+  }
+  bool segment_may_be_near(const Windows& windows, const Vec3 (&ends)[2], double most) const {
+    const Vec3 p = incident_.place(ends[0]), q = incident_.place(ends[1]);
+    const double gap_p = plane_.height(p), gap_q = plane_.height(q);
+    if (std::min(gap_p, gap_q) > most) return false;
+    const Vec2 at_p = plane_.project(p), at_q = plane_.project(q);
+    SegmentPart part;
+    if (!clip_segment(windows.wide, at_p, at_q, slack_, &part)) return false;
+    if (!clip_segment(windows.narrow, at_p, at_q, slack_, &part)) return true;
+    const auto gap = [&](double t) { return gap_p + t * (gap_q - gap_p); };
+    return std::max(gap(part.t0), gap(part.t1)) <= most;
+  }
+
+  bool face_points(double most, bool* swallowed) {
+    const Opposite o = opposite();
+    if (o.face < 0) return false;
+    const FlatFace& face = incident_.shape->flats.faces[o.face];
+    const ConvexPolygon cut = intersect(o.outline, window_, slack_);
     if (cut.count < 3) return false;
-    const Vec3 normal = incident_.turned(face.normal);
-    const double level = incident_.frame.scale * face.offset - normal.dot(plane_.origin - incident_.frame.x);
     points_.plane.count = 0;
     whole_ = true;
-    if (face.round) ring_ = f;
+    if (face.round) ring_ = o.face;
     *swallowed = true;
     for (int i = 0; i < cut.count; ++i) {
       const int b = cut.before(i);
@@ -229,16 +309,14 @@ class FaceContact {
       whole_ = whole_ && own;
       *swallowed = *swallowed && others;
       if (own) {
-        const int v = vertex(cut.side[i]);
+        const int v = vertex(face, cut.side[i]);
         const Vec3& point = incident_.vertex(v);
         points_.add(cut.corner[i], point, plane_.height(incident_.place(point)),
                     vertex_id(incident_.index, v));
         continue;
       }
       const Vec2& at = cut.corner[i];
-      const double height =
-          (level - at[0] * normal.dot(plane_.u) - at[1] * normal.dot(plane_.v)) / normal.dot(plane_.normal) -
-          plane_.level;
+      const double over = height(o, at);
       std::uint32_t id = 0;
       if (others) {
         id = vertex_id(reference_.index, face_.outline[cut.side[i]]);
@@ -246,9 +324,9 @@ class FaceContact {
         const int mine = cut.owner[b] == 0 ? cut.side[b] : cut.side[i];
         const int other = cut.owner[b] == 1 ? cut.side[b] : cut.side[i];
         id = crossing(face_.outline[other],
-                      vertex(mine + 1));  // a side is named by where it starts from outside
+                      vertex(face, mine + 1));  // a side is named by where it starts from outside
       }
-      points_.add(at, incident_.to_shape(plane_.lift(at, height)), height, id);
+      points_.add(at, incident_.to_shape(plane_.lift(at, over)), over, id);
     }
     return points_.within(most);
   }
@@ -297,15 +375,18 @@ class FaceContact {
       points_.add(other.plane.corner[i], other.on_body[i], other.gap[i], other.id[i]);
   }
 
-  bool line_points(double most) {
+  // The incident body's ruled line that is deepest.
+  bool incident_line(RuledLine* line) const {
     const Vec3 d = incident_.turned_back(-plane_.normal);
     const Shape& shape = *incident_.shape;
+    return !shape.flats.ruling.empty() &&
+           ruled_line(shape, find_hull_support(shape, d).where, d, kLineAngle, line);
+  }
+
+  bool line_points(double most) {
     RuledLine line;
-    if (shape.flats.ruling.empty() ||
-        !ruled_line(shape, find_hull_support(shape, d).where, d, kLineAngle, &line) ||
-        !segment(line.ends, {-1, -1}, most, &points_, &whole_))
-      return false;
-    rolling_ = 1;
+    if (!incident_line(&line) || !segment(line.ends, {-1, -1}, most, &points_, &whole_)) return false;
+    ruled_ = true;
     return true;
   }
 
@@ -324,7 +405,7 @@ class FaceContact {
   ConvexPolygon window_;  // the reference's outline
   Candidates points_;
   bool whole_ = false;  // every point is the incident body's own
-  int rolling_ = 0;
+  bool ruled_ = false;
   int ring_ = -1;  // the incident face if it is round
 };
 
@@ -335,29 +416,59 @@ struct Line {
   bool ruled;
 };
 
-bool support_line(const Body& body, const Vec3& d, double tolerance, Line* line) {
+// The points of its support set: 2 where it is a line.
+int support_line(const Body& body, const Vec3& d, double tolerance, Line* line) {
   const SupportSet set = support_set(*body.shape, body.turned_back(d), tolerance / body.frame.scale);
-  if (set.count != 2) return false;
+  if (set.count != 2) return set.count;
   for (int i = 0; i < 2; ++i) {
     line->ends[i] = body.place(set.point[i]);
     line->vertex[i] = set.vertex[i];
   }
   line->ruled = set.ruled;
-  return true;
+  return 2;
 }
 
-// Two parallel lines: the reference plane goes through A's, as square to the contact's normal as it can.
+// Two lines: the reference plane goes through A's, as square to the contact's normal as it can.
+struct LinePair {
+  Line a, b;
+  ReferencePlane plane;
+  double length;  // of A's
+  Vec2 p, q;      // ends of B's in the plane, along A's line and sideways
+
+  // Sideways from A's line, at most.
+  double aside() const { return std::max(std::abs(p[1]), std::abs(q[1])); }
+};
+
+LinePair pair_of(const Line& a, const Line& b, const Vec3& d) {
+  const Vec3 u = (a.ends[1] - a.ends[0]).normalized();
+  const Vec3 normal = (d - d.dot(u) * u).normalized();
+  LinePair lines{a, b, {a.ends[0], normal, u, normal.cross(u), 0}, u.dot(a.ends[1] - a.ends[0]), {}, {}};
+  lines.p = lines.plane.project(b.ends[0]);
+  lines.q = lines.plane.project(b.ends[1]);
+  return lines;
+}
+
+// Whether line_contact() must fail as long as no point goes further than `room`.
+bool lines_are_out_of_reach(const Body& a, const Body& b, const Vec3& d, double reach, double room) {
+  Line on_a, on_b;
+  const int points_a = support_line(a, d, reach + room, &on_a);
+  if (points_a < 2) return true;
+  const int points_b = support_line(b, -d, reach + room, &on_b);
+  return points_b < 2 ||
+         (points_a == 2 && points_b == 2 && pair_of(on_a, on_b, d).aside() > reach + 2 * room);
+}
+
+// Two parallel lines.
 bool line_contact(const Body& a, const Body& b, const Vec3& d, double overlap, double reach,
                   ContactPolygon* out) {
   Line on_a, on_b;
-  if (!support_line(a, d, reach, &on_a) || !support_line(b, -d, reach, &on_b)) return false;
-  const Vec3 u = (on_a.ends[1] - on_a.ends[0]).normalized();
-  const Vec3 normal = (d - d.dot(u) * u).normalized();
-  const ReferencePlane plane{on_a.ends[0], normal, u, normal.cross(u), 0};
-  const double length = u.dot(on_a.ends[1] - on_a.ends[0]);
-  const Vec2 p = plane.project(on_b.ends[0]), q = plane.project(on_b.ends[1]);
+  if (support_line(a, d, reach, &on_a) != 2 || support_line(b, -d, reach, &on_b) != 2) return false;
+  const LinePair lines = pair_of(on_a, on_b, d);
+  const ReferencePlane& plane = lines.plane;
+  const double length = lines.length;
+  const Vec2 &p = lines.p, &q = lines.q;
   // Lines further apart sideways than this touch at one point.
-  if (std::max(std::abs(p[1]), std::abs(q[1])) > reach) return false;
+  if (lines.aside() > reach) return false;
   Candidates points;
   bool whole = true;
   for (int i = 0; i < 2; ++i) {
@@ -373,12 +484,12 @@ bool line_contact(const Body& a, const Body& b, const Vec3& d, double overlap, d
   }
   if (!points.within(reach - overlap) || !finish(points, reach, nullptr, out)) return false;
   out->reference = 0;
-  out->rolling = on_a.ruled || on_b.ruled ? 1 : 0;
   out->factor = 1;
-  const Vec3 local = a.turned_back(normal);
+  const Vec3 local = a.turned_back(plane.normal);
   store(local, out->normal);
   out->offset = local.dot(a.to_shape(on_a.ends[0]));
   set_marks(a.frame, b.frame, out);
+  out->rolling = on_a.ruled || on_b.ruled ? 1 : 0;
   out->room = kSlideShare * length;
   return true;
 }
@@ -393,14 +504,33 @@ BodyFrame plane_frame(const Vec3& origin) {
   return {1, origin, Mat3::Identity(), nullptr};
 }
 
+namespace {
+
+// How far a body may go before it has a flat feature within reach of a plane, where it has none now. `d`:
+// towards the plane, shape axes.
+double clear_way(const Particle& particle, const Vec3& d, double reach) {
+  const double radius = particle.shape->bounding_radius;
+  for (const double share : kRooms)
+    if (support_set(*particle.shape, d, reach / particle.scale + share * radius).count < 2)
+      return kWayShare * share * particle.scale * radius;
+  return 0;
+}
+
+}  // namespace
+
 bool make_plane_polygon(const Particle& particle, const Vec3& origin, const Vec3& normal, double reach,
-                        ContactPolygon* out) {
+                        ContactPolygon* out, double* clear) {
   *out = {};
+  if (clear) *clear = 0;
   const Shape& shape = *particle.shape;
   if (shape.flats.empty()) return false;
   const BodyFrame frame = body_frame(particle);
-  const SupportSet set = support_set(shape, frame.axes.transpose() * -normal, reach / frame.scale);
-  if (set.count < 2) return false;
+  const Vec3 d = frame.axes.transpose() * -normal;
+  const SupportSet set = support_set(shape, d, reach / frame.scale);
+  if (set.count < 2) {
+    if (clear) *clear = clear_way(particle, d, reach);
+    return false;
+  }
   const auto height = [&](const Vec3& s) {
     return normal.dot(particle.x - origin + frame.scale * (frame.axes * s));
   };
@@ -420,12 +550,12 @@ bool make_plane_polygon(const Particle& particle, const Vec3& origin, const Vec3
       points.add({i * length, 0}, set.point[i], height(set.point[i]), vertex_id(1, set.vertex[i]));
   }
   if (!finish(points, reach / frame.scale, face ? &centre : nullptr, out)) return false;
-  out->rolling = set.ruled ? 1 : 0;
   if (face && shape.flats.faces[set.face].round) set_ring(shape, 1, set.face, out);
   out->factor = 1;
   store(normal, out->normal);
   out->room = kInfinite;
   set_marks(plane_frame(origin), frame, out);
+  out->rolling = set.ruled ? 1 : 0;
   return true;
 }
 
@@ -529,8 +659,9 @@ class RegionClip {
 }  // namespace
 
 RegionContact make_region_polygon(const Particle& particle, const PlaneRegion& region, const Vec3& frame,
-                                  double reach, ContactPolygon* out) {
+                                  double reach, ContactPolygon* out, double* clear) {
   *out = {};
+  if (clear) *clear = 0;
   const Shape& shape = *particle.shape;
   if (shape.flats.empty()) return RegionContact::point;
   const BodyFrame body = body_frame(particle);
@@ -544,8 +675,12 @@ RegionContact make_region_polygon(const Particle& particle, const PlaneRegion& r
     set_marks(plane_frame(frame), body, out);
     return RegionContact::polygon;
   };
-  const SupportSet set = support_set(shape, body.axes.transpose() * -region.normal, reach / body.scale);
-  if (set.count < 2) return RegionContact::point;
+  const Vec3 d = body.axes.transpose() * -region.normal;
+  const SupportSet set = support_set(shape, d, reach / body.scale);
+  if (set.count < 2) {
+    if (clear) *clear = clear_way(particle, d, reach);
+    return RegionContact::point;
+  }
   const auto whole = [&](double room) {
     if (!make_plane_polygon(particle, region.origin, region.normal, reach, out)) return RegionContact::point;
     return placed(room);
@@ -588,19 +723,18 @@ RegionContact make_region_polygon(const Particle& particle, const PlaneRegion& r
       points.add({t, 0}, to_shape(x), clip.height(x), 0);
       points.plane.corner[points.plane.count - 1] = {t * (q - p).norm(), 0};
     }
-    out->rolling = set.ruled ? 1 : 0;
   }
-  const int rolling = out->rolling;
   if (!finish(points, reach, nullptr, out)) return RegionContact::point;
-  out->rolling = rolling;
   out->factor = 1;
   store(region.normal, out->normal);
+  out->rolling = set.ruled ? 1 : 0;
   return placed(kSlideShare * size);
 }
 
 bool make_pair_polygon(const Particle& pa, const Particle& pb, const Vec3& normal, double overlap,
-                       double reach, const ContactPolygon* old, ContactPolygon* out) {
+                       double reach, const ContactPolygon* old, ContactPolygon* out, double* clear) {
   *out = {};
+  if (clear) *clear = 0;
   if (pa.shape->flats.empty() || pb.shape->flats.empty()) return false;
   const Body a(0, pa, pa.x), b(1, pb, pa.x);
   const int face_a = nearest_face(a.shape->flats, a.turned_back(normal), kFaceCosine);
@@ -613,11 +747,12 @@ bool make_pair_polygon(const Particle& pa, const Particle& pb, const Vec3& norma
   if (!(depth[first] <= most) || depth[1 - first] < depth[first] - kReferenceShare * overlap)
     first = 1 - first;
 
-  const auto attempt = [&](int reference, ContactPolygon* polygon, bool* swallowed) {
-    if (!(depth[reference] <= most)) return false;
+  const auto contact = [&](int reference) {
     const Body &owner = reference == 0 ? a : b, &other = reference == 0 ? b : a;
-    const FlatFace& face = owner.shape->flats.faces[reference == 0 ? face_a : face_b];
-    return FaceContact(owner, face, other).make(overlap, reach, polygon, swallowed);
+    return FaceContact(owner, owner.shape->flats.faces[reference == 0 ? face_a : face_b], other);
+  };
+  const auto attempt = [&](int reference, ContactPolygon* polygon, bool* swallowed) {
+    return depth[reference] <= most && contact(reference).make(overlap, reach, polygon, swallowed);
   };
   bool swallowed = false;
   if (attempt(first, out, &swallowed)) {
@@ -629,6 +764,18 @@ bool make_pair_polygon(const Particle& pa, const Particle& pb, const Vec3& norma
   if (attempt(1 - first, out, &swallowed)) return true;
   if (line_contact(a, b, normal, overlap, reach, out)) return true;
   *out = {};
+  if (!clear) return false;
+  const double smaller = std::min(a.radius(), b.radius()), larger = std::max(a.radius(), b.radius());
+  for (const double share : kRooms) {
+    const double room = share * smaller;
+    const auto away = [&](int reference) {
+      return depth[reference] > most + room ||
+             contact(reference).is_out_of_reach(reach - overlap + room, room);
+    };
+    if (!away(0) || !away(1) || !lines_are_out_of_reach(a, b, normal, reach, room)) continue;
+    *clear = kWayShare * room * smaller / larger;
+    break;
+  }
   return false;
 }
 
@@ -728,8 +875,17 @@ double support_gap(const ContactPolygon& polygon, const Particle* a, const Parti
   return outward.dot(apart) - incident.scale * h - level;
 }
 
+static double outgrown_below(const PolygonState& state) {
+  return state.least + kOutgrownShare * std::min(0.0, state.least);
+}
+
 bool outgrown(const PolygonState& state, double support_gap) {
-  return support_gap < state.least + kOutgrownShare * std::min(0.0, state.least);
+  return support_gap < outgrown_below(state);
+}
+
+double still_holds(const PolygonState& state, double support_gap, double radius_a, double radius_b) {
+  const double room = support_gap - outgrown_below(state);
+  return 0.25 * std::max(0.0, room) * std::min(radius_a, radius_b) / std::max(radius_a, radius_b);
 }
 
 double stored_energy(const ContactPolygon& polygon, const PolygonState& state) {

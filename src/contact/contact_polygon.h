@@ -29,7 +29,8 @@
 //             which rolls: remake. Book the jump stored_energy(new) - stored_energy(old), or take it up in
 //             the factor. It is of second order: none under a uniform gap, whatever the weights.
 //     tilted: some points are open, or it stands on a crease, so the body may touch elsewhere: compare with
-//             support_gap (one support search) by outgrown(); only if that says so, remake. Where all points
+//             support_gap (one support search) by outgrown(); only if that says so, remake. That it does not
+//             holds for the way `still_holds`. Where all points
 //             of a face are closed it can't be: beside a face the body falls away.
 //     A remake takes kKeptReach. One that yields count = 0 hands back to a single point, its factor likewise.
 //  4. match() tells from which old point every new one inherits its history. A spring xi_i is a displacement,
@@ -91,8 +92,12 @@ BodyFrame plane_frame(const Vec3& origin);
 // The face, crease or ruled line takes part whole if all its points lag behind the deepest one by at most
 // `reach` (length); false and count = 0 where none does. 0.8 us for a box, 2.5 us for a disc,
 // 11 us for a rounded box: mostly one support search from a cold start.
+//
+// `clear`, of this and the others, is set where the answer is no: how far the bodies' points may go, paths of
+// both together, before it can be another one; 0 where that is not known. It holds for contacts whose normal
+// turns with the bodies, and whose overlap grows by no more than they go.
 bool make_plane_polygon(const Particle& particle, const Vec3& origin, const Vec3& normal, double reach,
-                        ContactPolygon* out);
+                        ContactPolygon* out, double* clear = nullptr);
 
 // The part of a plane that is wall: convex cells, as a triangle mesh has them, lab.
 struct PlaneRegion {
@@ -109,7 +114,7 @@ struct PlaneRegion {
 // `clear`: a feature meets the plane, but not over the region.
 enum class RegionContact { point, clear, polygon };
 RegionContact make_region_polygon(const Particle& particle, const PlaneRegion& region, const Vec3& frame,
-                                  double reach, ContactPolygon* out);
+                                  double reach, ContactPolygon* out, double* clear = nullptr);
 
 // The contact of two particles touching with `normal` (A to B, lab) and `overlap`, as the ladder found them;
 // the normal need only be good to some degrees, as the faces supply theirs. Candidates for the reference are
@@ -122,7 +127,7 @@ RegionContact make_region_polygon(const Particle& particle, const PlaneRegion& r
 // for two boxes, 15 to 30 us for discs and rounded boxes, of which support searches from cold starts are the
 // most.
 bool make_pair_polygon(const Particle& a, const Particle& b, const Vec3& normal, double overlap, double reach,
-                       const ContactPolygon* old, ContactPolygon* out);
+                       const ContactPolygon* old, ContactPolygon* out, double* clear = nullptr);
 
 // Where the points are now. Of a whole round face the normal springs stand on all the points of its outline
 // (64, fixed weights FlatFace::weight), so that it has no preferred directions and never needs a remake while
@@ -150,6 +155,9 @@ double support_gap(const ContactPolygon& polygon, const Particle* a, const Parti
                    const Vec3& origin = Vec3::Zero());
 // Whether the incident body touches deeper than the points say.
 bool outgrown(const PolygonState& state, double support_gap);
+
+// The way (paths of both bodies together, radii in lengths) until it may.
+double still_holds(const PolygonState& state, double support_gap, double radius_a, double radius_b);
 
 // U / kn, the factor included.
 double stored_energy(const ContactPolygon& polygon, const PolygonState& state);

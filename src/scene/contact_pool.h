@@ -42,6 +42,8 @@ struct alignas(64) ContactBlock {
   int a[kBlock], b[kBlock];            // bodies; a < 0: the wall
   int law[kBlock];
   int fresh[kBlock];       // 1 + number of a result of this step; 0: none
+  double until[kBlock];    // way of the bodies: before it the contact is no polygon's, or, in lane 0 of a
+                           // polygon's block, the body touches nowhere else
   std::uint32_t used = 0;  // a bit a contact
 
   void get(int lane, int first, int count, void* to) const {
@@ -76,6 +78,7 @@ class ContactPool {
   std::int32_t add(const ContactRecord& record) {
     const std::int32_t number = take(blocks_, free_);
     block(number).set(lane(number), 0, kContactSize, &record);
+    forget_way(number);
     if (memory_size_ != 0) {
       memory_.resize(blocks_.size() * kBlock * memory_size_);
       std::fill_n(memory(block(number), lane(number)), memory_size_, 0.0);
@@ -123,6 +126,11 @@ class ContactPool {
   FlatContact* flat_of(const ContactBlock& block, int lane) {
     const int index = static_cast<int>(block.field[kFlat][lane]);
     return index == 0 ? nullptr : &flats_[index - 1];
+  }
+  // The bodies' ways are counted anew.
+  void forget_way(std::int32_t number) {
+    block(number).until[lane(number)] = 0;
+    if (FlatContact* polygon = flat(number)) polygon->points.until[0] = 0;
   }
   // Gives a contact a polygon, without points; pointers to others' polygons become invalid.
   FlatContact& add_flat(std::int32_t number) {

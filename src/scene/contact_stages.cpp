@@ -104,16 +104,18 @@ ContactCoefficients ContactStages::coefficients(const ContactBlock& block, int l
   return scaled(step_.laws[block.law[lane]], std::abs(block.field[kWeight][lane]));
 }
 
-double ContactStages::path(int k) const {
+// A way that no point of the two has exceeded; of a listed wall it holds the body's.
+double ContactStages::path(int a, int b) const {
+  if (a < -1) return partners_[-2 - a].path;
   const double* path = step_.bodies->path();
-  return (a_[k] < 0 ? 0 : path[a_[k]]) + path[b_[k]];
+  return (a < 0 ? 0 : path[a]) + path[b];
 }
 
 // How far the paths may go on until a neighbour that is `lower` apart may touch. A sphere's turns are no
 // path, yet move its support by the round-off that it is known to.
 double ContactStages::expiry(int k, double lower) const {
   const double size = record(b_[k]).radius + (a_[k] < 0 ? 0 : record(a_[k]).radius);
-  return path(k) + kBudgetShare * lower - 2 * kSphere * size;
+  return path(a_[k], b_[k]) + kBudgetShare * lower - 2 * kSphere * size;
 }
 
 std::uint64_t ContactStages::stamp_of(int a, int b) const {
@@ -147,6 +149,7 @@ void ContactStages::check_stamps() {
     }
     ContactBlock& block = pool_.block(proof.contact);
     const int lane = ContactPool::lane(proof.contact);
+    pool_.forget_way(proof.contact);
     set_law(static_cast<int>(k));
     const std::uint64_t stamp = stamp_of(a_[k], b_[k]);
     if (proof.stamp == stamp) continue;

@@ -67,6 +67,7 @@ struct WallContact {
   int mark = 0;                                       // the caller's
   PlaneRegion* region = nullptr;  // that a flat feature of the body stands on, until the end of the step
   std::uint64_t name = 0;         // of the piece of the wall
+  double path = 0;                // of the body and the wall together, as Bodies::path
   PairMemory memory;
 };
 
@@ -189,7 +190,7 @@ class ContactStages {
   const BodyRecord& record(int body) const {
     return body >= 0 ? step_.bodies->record(body) : body == -1 ? *step_.wall : partners_[-2 - body].record;
   }
-  double path(int k) const;
+  double path(int a, int b) const;
   double expiry(int k, double lower) const;
   std::uint64_t stamp_of(int a, int b) const;
   int law_of(int a, int b) const;
@@ -254,6 +255,7 @@ class ContactStages {
     bool seen = false;
     double body[3] = {};                  // where the body was in the last step
     const PlaneRegion* region = nullptr;  // of this step
+    double path = 0;                      // of wall and body
     // Of balanced contacts.
     std::uint64_t name = 0;  // of the piece of the wall
     double level = 0;        // normal . wall's point
@@ -294,7 +296,7 @@ class ContactStages {
   bool may_be_flat(int a, int b) const;
   Vec3 wall_frame(int a) const;
   bool find_polygon(int a, int b, const Vec3& normal, double overlap, double reach, const ContactPolygon* old,
-                    ContactPolygon* polygon) const;
+                    ContactPolygon* polygon, double* clear = nullptr) const;
   void finish(const ContactCoefficients& law, int a, int b, const ContactState& state);
   bool make_flat(ContactBlock& block, int lane, const Results& single);
   struct LeftPolygon {  // what a polygon leaves behind

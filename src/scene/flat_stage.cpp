@@ -9,6 +9,8 @@
 namespace nurbs {
 namespace {
 
+constexpr double kSameNormal = 0.99;  // cosine between a contact's normals of two steps: 8 degrees
+
 BodyFrame frame_of(const BodyRecord& r, double scale, const Shape* shape) {
   BodyFrame f;
   f.scale = scale;
@@ -79,17 +81,18 @@ PolygonState ContactStages::polygon_state(const ContactPolygon& polygon, int b, 
 
 // The polygon of two bodies that touch, or of a body and the wall; false where they meet at a point.
 bool ContactStages::find_polygon(int a, int b, const Vec3& normal, double overlap, double reach,
-                                 const ContactPolygon* old, ContactPolygon* polygon) const {
+                                 const ContactPolygon* old, ContactPolygon* polygon, double* clear) const {
   const Particle body = step_.bodies->particle(b);
   if (a < -1) {
     const PlaneRegion* region = partners_[-2 - a].region;
     return region != nullptr &&
-           make_region_polygon(body, *region, wall_frame(a), reach, polygon) == RegionContact::polygon &&
+           make_region_polygon(body, *region, wall_frame(a), reach, polygon, clear) ==
+               RegionContact::polygon &&
            polygon->count >= 2;
   }
   const bool made =
-      a < 0 ? make_plane_polygon(body, load(step_.wall->x), step_.wall_normal, reach, polygon)
-            : make_pair_polygon(step_.bodies->particle(a), body, normal, overlap, reach, old, polygon);
+      a < 0 ? make_plane_polygon(body, load(step_.wall->x), step_.wall_normal, reach, polygon, clear)
+            : make_pair_polygon(step_.bodies->particle(a), body, normal, overlap, reach, old, polygon, clear);
   return made && polygon->count >= 2;
 }
 
@@ -105,9 +108,18 @@ void ContactStages::finish(const ContactCoefficients& law, int a, int b, const C
 // gain or lose along it is booked.
 bool ContactStages::make_flat(ContactBlock& block, int lane, const Results& single) {
   const int a = block.a[lane], b = block.b[lane];
+  const Vec3 normal = single.normal_of(lane);
+  double before[3];
+  block.get(lane, kStateField + 3, 3, before);
+  const double way = path(a, b);
+  if (way < block.until[lane] && normal.dot(load(before)) > kSameNormal) return false;
   const double overlap = -single.gap[lane];
   ContactPolygon polygon;
-  if (!find_polygon(a, b, single.normal_of(lane), overlap, kReach * overlap, nullptr, &polygon)) return false;
+  double clear = 0;
+  if (!find_polygon(a, b, normal, overlap, kReach * overlap, nullptr, &polygon, &clear)) {
+    block.until[lane] = way + clear;
+    return false;
+  }
   const PolygonState state = now(polygon, *step_.bodies, wall_frame(a), a, b);
   if (!(state.energy > 0)) return false;
   const double weight = block.field[kWeight][lane];
@@ -153,7 +165,10 @@ bool ContactStages::serve_flat(ContactBlock& block, int lane, LeftPolygon* left)
   FlatContact& flat = *pool_.flat_of(block, lane);
   PolygonState state = now(flat.polygon, *step_.bodies, wall_frame(a), a, b);
   const PolygonVerdict verdict = judge(flat.polygon, state);
-  if (!step_.setup && verdict != PolygonVerdict::keep) {
+  const double way = path(a, b);
+  double& until = flat.points.until[0];
+  if (!step_.setup && verdict != PolygonVerdict::keep &&
+      !(verdict == PolygonVerdict::tilted && way < until)) {
     const Particle body = step_.bodies->particle(b);
     const Particle first = a < 0 ? Particle{} : step_.bodies->particle(a);
     bool stays = verdict != PolygonVerdict::open;
@@ -163,6 +178,9 @@ bool ContactStages::serve_flat(ContactBlock& block, int lane, LeftPolygon* left)
       if (verdict == PolygonVerdict::moved || outgrown(state, deepest)) {
         overlap = std::max(overlap, -deepest);
         stays = remake(block, lane, flat, state, overlap);
+        until = way;
+      } else {
+        until = way + still_holds(state, deepest, record(a).radius, record(b).radius);
       }
     }
     if (!stays) {

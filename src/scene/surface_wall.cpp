@@ -146,6 +146,7 @@ void SurfaceWall::find_for(int body, const ContactStages::Step& step,
       plane_region(patches_[patch_of_[body]]->mesh, c.plane, particle.x, &regions_[regions_used_]);
       f.region = &regions_[regions_used_++];
     }
+    f.path = step.bodies->path()[body] + path_;
     f.memory = c.memory;
     ContactResult& r = f.result;
     r = ContactResult{};

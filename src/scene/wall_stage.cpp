@@ -73,8 +73,10 @@ void ContactStages::update_listed(std::int32_t number, int body, const WallConta
   }
   p.mark = found.mark;
   p.region = found.region;
+  p.path = found.path;
   store(load(step_.bodies->record(body).x), p.body);
   bind_listed(number, body);
+  if (step_.bodies->reshaped()) pool_.forget_way(number);
   if (FlatContact* flat = pool_.flat(number); flat && p.region) {  // the wall may have moved
     store(p.region->normal, flat->polygon.normal);
     flat->polygon.offset = p.region->normal.dot(p.region->origin - x);  // it stands back already
@@ -264,6 +266,7 @@ void ContactStages::begin_lists() {
 void ContactStages::keep_list(int body, std::int32_t head) {
   for (; head != 0; head = partner(head).next) {
     partner(head).seen = true;
+    pool_.forget_way(head);
     bind_listed(head, body);
   }
 }

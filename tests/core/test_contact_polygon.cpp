@@ -35,6 +35,15 @@ ShapePointer slab() {
   return s;
 }
 
+ShapePointer hexagon() {
+  static const ShapePointer s = make_shape("prism", prism(6, 0.8, 0.5));
+  return s;
+}
+ShapePointer round_rimmed() {
+  static const ShapePointer s = make_shape("rounded cylinder", rounded_cylinder(0.8, 0.4, 0.1));
+  return s;
+}
+
 // A scene turned and moved at random: bodies are placed in it as if it were the lab.
 struct Scene {
   Quat q;
@@ -499,6 +508,110 @@ TEST(PairPolygon, sliding_over_a_border_is_continuous) {
   }
   EXPECT_GT(remakes, 100);
   EXPECT_GT(named, 0.95 * points);  // names change only where a corner passes a side
+}
+
+// --- no polygon, and for how long
+
+// Moves a body so that its points go no further than `way`, centre's path and turn together.
+void move(Random& random, double way, Particle* p) {
+  const double turned = random.below(3) == 0 ? 0 : random.uniform(0, 1);
+  p->x += (1 - turned) * way * random.direction();
+  p->q =
+      (about(random.direction(), turned * way / (p->scale * p->shape->bounding_radius)) * p->q).normalized();
+}
+
+std::vector<ShapePointer> flat_shapes() {
+  return {cuboid(), roller(), pill(), soap(), slab(), hexagon(), round_rimmed()};
+}
+
+TEST(PairPolygon, where_there_is_none_there_is_none_on_the_clear_way) {
+  const std::vector<ShapePointer> shapes = flat_shapes();
+  const ContactSettings settings;
+  Random random(21);
+  int asked = 0, facing = 0;
+  for (int n = 0; n < 4000; ++n) {
+    Particle a, b;
+    a.shape = shapes[random.below(static_cast<int>(shapes.size()))].get();
+    b.shape = shapes[random.below(static_cast<int>(shapes.size()))].get();
+    b.scale = random.uniform(0.4, 1.5);
+    a.q = random.turn();
+    const auto &faces_a = a.shape->flats.faces, &faces_b = b.shape->flats.faces;
+    const bool face_to_face = n % 3 != 0 && !faces_a.empty() && !faces_b.empty();
+    const double far = a.shape->bounding_radius + b.scale * b.shape->bounding_radius;
+    if (face_to_face) {  // all but; or some part of B on A's face
+      const Vec3 up = a.q * faces_a[n % faces_a.size()].normal;
+      const Vec3 down = n % 2 == 0 ? faces_b[n / 7 % faces_b.size()].normal : random.direction();
+      b.q = about(random.direction(), random.log_uniform(1e-5, 0.3)) * Quat::FromTwoVectors(down, -up);
+      b.x = far * up + random.uniform(0, 0.8) * random.direction();
+    } else {
+      b.q = random.turn();
+      b.x = far * random.direction();
+    }
+    const auto contact = [&] {
+      double memory[kPairMemorySize] = {};
+      return find_contact(a, b, settings, memory);
+    };
+    const double overlap = random.log_uniform(1e-5, 1e-2);
+    ContactResult r = contact();
+    for (int k = 0; k < 20 && std::abs(r.gap + overlap) > 0.1 * overlap; ++k) {
+      b.x -= (r.gap + overlap) * r.normal;
+      r = contact();
+    }
+    if (!(r.gap < 0)) continue;
+    ContactPolygon polygon;
+    double clear = 0;
+    if (make_pair_polygon(a, b, r.normal, -r.gap, -kReach * r.gap, nullptr, &polygon, &clear)) continue;
+    const Particle a0 = a, b0 = b;
+    for (int k = 0; k < 8 && clear > 0; ++k) {
+      a = a0;
+      b = b0;
+      const double share = random.uniform(0, 1);
+      move(random, 0.999 * share * clear, &a);
+      move(random, 0.999 * (1 - share) * clear, &b);
+      const ContactResult now = contact();
+      if (!(now.gap < 0) || now.normal.dot(r.normal) < 0.99) continue;
+      ++asked;
+      facing += face_to_face;
+      EXPECT_FALSE(make_pair_polygon(a, b, now.normal, -now.gap, -kReach * now.gap, nullptr, &polygon))
+          << a.shape->name << ", " << b.shape->name << ", " << n << ": " << clear;
+    }
+  }
+  EXPECT_GT(asked, 4000);
+  EXPECT_GT(facing, 2000);
+}
+
+TEST(PlanePolygon, where_there_is_none_there_is_none_on_the_clear_way) {
+  const std::vector<ShapePointer> shapes = flat_shapes();
+  Random random(22);
+  int asked = 0;
+  for (int n = 0; n < 3000; ++n) {
+    Particle p;
+    p.shape = shapes[random.below(static_cast<int>(shapes.size()))].get();
+    p.scale = random.uniform(0.4, 1.5);
+    const auto& faces = p.shape->flats.faces;
+    const Vec3 down = n % 2 == 0 && !faces.empty() ? faces[n / 7 % faces.size()].normal : random.direction();
+    p.q =
+        about(random.direction(), random.log_uniform(1e-5, 0.5)) * Quat::FromTwoVectors(down, -Vec3::UnitZ());
+    const auto lowest = [&] {
+      return p.x[2] - p.scale * find_support(*p.shape, p.q.conjugate() * -Vec3::UnitZ()).h;
+    };
+    const auto has_one = [&](double* clear) {
+      ContactPolygon polygon;
+      return make_plane_polygon(p, Vec3::Zero(), Vec3::UnitZ(), -kReach * lowest(), &polygon, clear);
+    };
+    p.x[2] -= lowest() + random.log_uniform(1e-5, 1e-2);
+    double clear = 0;
+    if (has_one(&clear)) continue;
+    const Particle start = p;
+    for (int k = 0; k < 8 && clear > 0; ++k) {
+      p = start;
+      move(random, 0.999 * clear, &p);
+      if (!(lowest() < 0)) continue;
+      ++asked;
+      EXPECT_FALSE(has_one(nullptr)) << p.shape->name << ", " << n << ": " << clear;
+    }
+  }
+  EXPECT_GT(asked, 4000);
 }
 
 TEST(ContactPolygon, is_plain_data) {
