@@ -8,8 +8,8 @@
 
 A picture is drawn beside the CSV (default: scene.csv or scene_tolerance.csv in BUILD/scene).
 
-Cases: sphere (the host's own), nurbs-sphere, ellipsoid (1 : 1.5 : 2), pebble, blocky (exponent 4), bodies with
-flat faces (tablet; box 1 : 0.8 : 0.6), and, where the
+Cases: sphere (the host's own), nurbs-sphere, ellipsoid (1 : 1.5 : 2), pebble, blocky (exponent 4), tablet (flat
+faces, rounded rims), and, where the
 environment says LIGGGHTS_SUPERQUADRIC=program, superquadric-ellipsoid and superquadric-blocky. All particles have the
 volume of a sphere of 5 mm and the same linear law; the decks are bench/decks/in.*. A bed is a lattice, turned at
 random, dropped into a box of six planes and settled; then the lid comes down to 1.4 times its height. Every shape's bed
@@ -67,7 +67,6 @@ SHAPES = {  # arguments of nurbs-shape make
     "pebble": ["pebble"],
     "blocky": ["superellipsoid", "--axes", "1,1,1", "--exponent", "4"],
     "tablet": ["tablet", "--radius", "1", "--height", "0.8", "--rim", "0.15"],
-    "box": ["box", "--axes", "1,0.8,0.6"],
 }
 CASES = {  # name: (deck, shape of the bed)
     "sphere": ("sphere", "sphere"),
@@ -76,7 +75,6 @@ CASES = {  # name: (deck, shape of the bed)
     "pebble": ("nurbs", "pebble"),
     "blocky": ("nurbs", "blocky"),
     "tablet": ("nurbs", "tablet"),
-    "box": ("nurbs", "box"),
     "superquadric-ellipsoid": ("superquadric", "ellipsoid"),
     "superquadric-blocky": ("superquadric", "blocky"),
 }

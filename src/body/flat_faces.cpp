@@ -60,17 +60,27 @@ struct BoundaryCurve {
   }
 };
 
-bool is_straight(const BezierPatch& patch, int edge, double tolerance) {
-  const int n = edge < 2 ? patch.degree_v : patch.degree_u;
-  const auto point = [&](int k) {
+// Control points of a patch's edge.
+std::vector<Vec3> edge_points(const BezierPatch& patch, int edge) {
+  std::vector<Vec3> points;
+  for (int k = 0; k <= (edge < 2 ? patch.degree_v : patch.degree_u); ++k) {
     const int i = edge < 2 ? (edge == 0 ? 0 : patch.degree_u) : k;
     const int j = edge < 2 ? k : (edge == 2 ? 0 : patch.degree_v);
-    return control_point(patch.point(i, j));
-  };
-  const Vec3 from = point(0), along = (point(n) - from).normalized();
-  for (int k = 1; k < n; ++k)
-    if ((point(k) - from).cross(along).norm() > tolerance) return false;
-  return true;
+    points.push_back(control_point(patch.point(i, j)));
+  }
+  return points;
+}
+
+// How far points are from the line through `from` along a unit vector.
+double beside(const std::vector<Vec3>& points, const Vec3& from, const Vec3& along) {
+  double most = 0;
+  for (const Vec3& x : points) most = std::max(most, (x - from).cross(along).norm());
+  return most;
+}
+
+bool is_straight(const BezierPatch& patch, int edge, double tolerance) {
+  const std::vector<Vec3> points = edge_points(patch, edge);
+  return beside(points, points.front(), (points.back() - points.front()).normalized()) <= tolerance;
 }
 
 // Calls visit(curve, t, weight) at Gauss points of all curves.
@@ -210,8 +220,13 @@ class Finder {
     face.centroid += sum / face.area;
     face.offset = offset / total;
     // On the hull, or no place to stand on.
-    const double h = find_hull_support(shape_, face.normal).h;
-    if (h > face.offset + 4 * tolerance_ || !(face.offset > 0)) return;
+    const Support top = find_hull_support(shape_, face.normal);
+    if (top.h > face.offset + 4 * tolerance_ || !(face.offset > 0)) return;
+    face.patch = label;
+    face.slack = top.upper - face.offset;
+    for (const int p : group)
+      for (const Vec4& point : shape_.patches[p].points)
+        face.slack = std::max(face.slack, std::abs(face.normal.dot(control_point(point)) - face.offset));
     const Vec3 arm = boundary[0].point(0) - face.centroid;
     face.axis_u = (arm - arm.dot(face.normal) * face.normal).normalized();
     outline(boundary, face);
@@ -275,6 +290,7 @@ class Finder {
   }
 
   void find_edges() {
+    std::vector<std::vector<Vec3>> creases;
     for (int p = 0; p < static_cast<int>(shape_.patches.size()); ++p)
       for (int e = 0; e < 4; ++e) {
         const EdgeLink& link = shape_.links[p][e];
@@ -283,7 +299,22 @@ class Finder {
         if (!is_straight(shape_.patches[p], e, tolerance_)) continue;
         const BoundaryCurve curve{&shape_.patches[p], e, true};
         add_edge(curve.point(0), curve.point(1));
+        creases.push_back(edge_points(shape_.patches[p], e));
       }
+    for (StraightEdge& edge : out_.edges)
+      for (const std::vector<Vec3>& points : creases)
+        edge.slack = std::max(edge.slack, slack_of(points, edge));
+  }
+
+  // How far a crease is beside the straight edge that it belongs to; 0 if it belongs to another one.
+  double slack_of(const std::vector<Vec3>& points, const StraightEdge& edge) const {
+    const Vec3 &from = out_.vertices[edge.ends[0]], &to = out_.vertices[edge.ends[1]];
+    const double off = beside(points, from, edge.direction);
+    const double low = edge.direction.dot(points.front() - from),
+                 high = edge.direction.dot(points.back() - from);
+    const bool overlaps =
+        std::max(low, high) > tolerance_ && std::min(low, high) < (to - from).norm() - tolerance_;
+    return off <= 4 * tolerance_ && overlaps ? off : 0;
   }
 
   // A piece that goes straight on from an edge at hand lengthens it, and may close the gap to another one.

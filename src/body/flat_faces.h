@@ -21,6 +21,8 @@ struct FlatFace {
   Vec3 normal = Vec3::Zero();    // outward, unit
   Vec3 axis_u = Vec3::Zero();    // unit, in the face; the second one is normal x axis_u
   double offset = 0;             // normal . x of its plane, > 0
+  double slack = 0;              // by which the body, and the face's own patches, may be beside that plane
+  int patch = 0;                 // one of its own
   double area = 0;               // of the true outline, as is
   Vec3 centroid = Vec3::Zero();  // ... its centroid
   bool round = false;            // `outline` is inscribed in the true outline, not equal to it
@@ -35,6 +37,7 @@ struct FlatFace {
 struct StraightEdge {             // a convex crease; collinear pieces are one
   int ends[2] = {0, 0};           // vertices
   Vec3 direction = Vec3::Zero();  // unit, from the first to the second
+  double slack = 0;               // by which the surface may be beside it
 };
 
 // Straight parameter lines along which the normal is constant: cylinders, cones, rounded edges.

@@ -9,6 +9,7 @@
 #include "contact/deep_search.h"
 #include "contact/direction_search.h"
 #include "contact/ellipsoid_search.h"
+#include "contact/flat_search.h"
 #include "contact/joint_newton.h"
 #include "contact/pair_frame.h"
 #include "contact/pair_memory.h"
@@ -104,6 +105,7 @@ class Ladder {
 
   // Rung 4: Newton from where the contact would be, had it moved on as it last did.
   bool warm(const PairFrame& pair, double tolerance, ContactResult* r) {
+    if (meet_on_flat(pair, tolerance, r)) return true;
     JointSolution s = solve_joint(pair, warm_point(memory_.on_a, *pair.a), warm_point(memory_.on_b, *pair.b),
                                   tolerance, settings_.reach, kWarmIterations);
     r->iterations = s.iterations;
@@ -119,6 +121,19 @@ class Ladder {
     const double turned2_a = turned2(a_.q, memory_.proof.q_a), turned2_b = turned2(b_.q, memory_.proof.q_b);
     *r = finish(pair, s, s.normal, Rung::warm, s.iterations);
     if (r->status == Status::converged) remember_model(pair, s, turned2_a, turned2_b);
+    return true;
+  }
+
+  // A face or a crease that the last direction belonged to.
+  bool meet_on_flat(const PairFrame& pair, double tolerance, ContactResult* r) {
+    if (!has_proof(memory_.proof) || (pair.a->flats.empty() && pair.b->flats.empty())) return false;
+    JointSolution s;
+    s.iterations = 0;
+    s.points.on_a = warm_point(memory_.on_a, *pair.a);
+    s.points.on_b = warm_point(memory_.on_b, *pair.b);
+    if (!meet_flat(pair, pair.axes_a.transpose() * load(memory_.proof.direction), tolerance, &s))
+      return false;
+    *r = finish(pair, s, s.normal, Rung::warm, s.iterations);
     return true;
   }
 
