@@ -379,6 +379,13 @@ class Warned(unittest.TestCase):
         for setting in ("set group all density 1\n", "set atom 4 density 2\n"):
             self.assertNotIn("density", "".join(self.warnings(text + setting + "run 0\n")))
 
+    def test_particles_wider_than_the_box(self):
+        """Millimetres taken for metres: said once, before the host's own end; a long body in a short box is none."""
+        for ranks in (1, 2):
+            for scale, count in ((9, 0), (13, 1)):
+                run = deck.run(DECK.replace("p p f", "f f f") + f"set atom 2 nurbs/scale {scale}\nrun 0\nrun 0\n", ranks=ranks, files=files())
+                self.assertEqual(run.screen.count("particles of inner diameter 13 in a box 12 wide"), count, run.screen[-800:])
+
     def test_move_without_turning(self):
         text = DECK.replace("nve/nurbs", "move linear 1 0 0")
         self.assertEqual(self.warnings(text + "run 1\n"), [])
