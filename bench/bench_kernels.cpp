@@ -14,6 +14,7 @@
 #include "bench/machine.h"
 #include "bench/staged_pairs.h"
 #include "body/support.h"
+#include "contact/cylinder_search.h"
 #include "contact/direction_search.h"
 #include "contact/pair_memory.h"
 #include "contact/pair_search.h"
@@ -262,6 +263,42 @@ void plane(benchmark::State& state, int which, double turn) {
   }
 }
 
+// The same on the wall of a tube of ten times its size, as a wall keeps its contacts from step to step.
+void tube(benchmark::State& state, int which, double turn) {
+  const Scene& s = scene(which);
+  const ContactSettings settings = host_settings();
+  Random random(9);
+  const Quat step(Eigen::AngleAxisd(turn, random.direction()));
+  const Shape& shape = *s.body->shape;
+  const double radius = 10 * shape.bounding_radius;
+  const Vec3 axis(0, 0, 1), out(1, 0, 0);
+  size_t k = 0;
+  for (auto _ : state) {
+    Particle body = s.paths[k][0].a;
+    if (++k == s.paths.size()) k = 0;
+    std::vector<Particle> path;
+    while (path.size() < kSteps) {
+      body.x = (radius - find_support(shape, body.q.conjugate() * out).h + 1e-3) * out;
+      path.push_back(body);
+      body.q = (step * body.q).normalized();
+    }
+    SurfaceContacts found;
+    TubeSurvey survey;
+    double spent = 0;
+    for (int i = 0; i < kSteps; ++i) {
+      const SurfaceContacts last = found;
+      FormerContact former[kSurfaceContacts];
+      for (int j = 0; j < last.count; ++j)
+        former[j] = {last.contact[j].normal, &last.contact[j].memory, false};
+      const double start = thread_seconds();
+      find_cylinder_contacts(path[i], Vec3::Zero(), axis, radius, settings, 0, former, last.count, &survey,
+                             &found);
+      if (i > 1) spent += thread_seconds() - start - clock_cost();
+    }
+    state.SetIterationTime(std::max(1e-9, spent) / (kSteps - 2));
+  }
+}
+
 void cold(benchmark::State& state, int which, Solver solver) {
   const Scene& s = scene(which);
   ContactSettings settings = host_settings();
@@ -385,7 +422,7 @@ double quantile(std::vector<double> x, double q) {
   return x[static_cast<size_t>(q * (x.size() - 1) + 0.5)];
 }
 
-constexpr const char* kByHand[] = {"/turning", "/plane", "/step:"};  // kernels that time themselves
+constexpr const char* kByHand[] = {"/turning", "/plane", "/tube", "/step:"};  // kernels that time themselves
 
 // Collects every repetition of every benchmark, named body/kernel.
 class Collector : public benchmark::BenchmarkReporter {
@@ -449,6 +486,12 @@ std::vector<std::string> register_all() {
         ->UseManualTime()
         ->Iterations(kPaths);
     add("plane, resting", [=](benchmark::State& s) { plane(s, which, kRest); })
+        ->UseManualTime()
+        ->Iterations(kPaths);
+    add("tube, turning 2e-3", [=](benchmark::State& s) { tube(s, which, kTurn); })
+        ->UseManualTime()
+        ->Iterations(kPaths);
+    add("tube, resting", [=](benchmark::State& s) { tube(s, which, kRest); })
         ->UseManualTime()
         ->Iterations(kPaths);
     add("step: skipped neighbour", [=](benchmark::State& s) { staged_rest(s, which, 1.1); })

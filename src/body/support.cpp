@@ -206,8 +206,9 @@ int edge_of(const SurfacePoint& at) {
 
 // The same at a point x of a crease that opens. Of the directions m in the fan between its sides' normals x
 // is the support: no other point has such a normal (normal_map.h, or the body has no dents at all). Beyond
-// the fan h(d) <= d.x + r (1 - d.m), r the largest curvature radius near d. Infinite where there is no fan
-// near d, or nothing is promised there.
+// the fan h(d) <= d.x + r (1 - d.m), r the largest curvature radius near d; where there is none, by
+// the slope times the body's diameter and what dents may hide. Infinite where there is no fan near d, or
+// nothing is promised there.
 double crease_excess(const Shape& shape, const Vec3& d, const SurfacePoint& at, const Jet2& jet) {
   constexpr double kNone = std::numeric_limits<double>::infinity();
   const int edge = edge_of(at);
@@ -216,7 +217,8 @@ double crease_excess(const Shape& shape, const Vec3& d, const SurfacePoint& at, 
   if (link.collapsed || link.patch < 0) return kNone;
   const bool round = shape.normal_map.cells == 0 && shape.joints.concave == 0 && shape.joint_slack == 0;
   const double radius = round ? shape.patch_curvature.max_radius : shape.normal_map.radius_at(d);
-  if (!(radius < kFarAway)) return kNone;
+  const bool bent = radius < kFarAway, opening = shape.joints.concave == 0 && shape.joint_slack == 0;
+  if (!bent && !opening) return kNone;
   const SurfacePoint q = across(shape.patches, link, at, edge);
   const Jet1 here{jet.s, jet.su, jet.sv}, there = evaluate1(shape.patches[q.patch], q.u, q.v);
   const Normal na = normal_at(shape, here.su, here.sv), nb = normal_at(shape, there.su, there.sv);
@@ -228,7 +230,8 @@ double crease_excess(const Shape& shape, const Vec3& d, const SurfacePoint& at, 
                        std::max(0.0, inward_slope(here, edge, d)) +
                        std::max(0.0, inward_slope(there, link.edge, d));
   if (!(chord <= 0.5 * kNormalMargin)) return kNone;
-  return kFanSafety * 0.5 * radius * chord * chord + link.gap;
+  return kFanSafety * rolling_excess(radius, shape.bounding_radius, chord * chord) + link.gap +
+         (bent ? 0 : shape.support_excess);
 }
 
 // Sets where a support is, its height along d and its normal; the normal's error with it.

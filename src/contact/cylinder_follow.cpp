@@ -6,15 +6,11 @@
 
 #include "body/support.h"
 #include "contact/certificate.h"
+#include "contact/support_turn.h"
 #include "nurbs/tolerances.h"
 
 namespace nurbs {
 namespace {
-
-constexpr int kModelSteps = 3;        // of Newton over the model, in the angle of c
-constexpr double kSameAngle = 1e-13;  // rad: c has been found
-constexpr int kSurfaceSteps = 5;      // of Newton on the surface
-constexpr double kAtRest = 1e-9;      // rad between normal and c: the evaluated point is the answer
 
 std::uint64_t stamp_of(const Particle& particle) {
   return pair_stamp(0, stamp(particle), Solver::ladder);
@@ -58,7 +54,7 @@ class Follower {
       bend = m.w0 * et * et + 2 * m.w1 * et * es + m.w2 * es * es - f;
       if (!(-pose_.side * bend > 0)) return false;
       const double step = -slope / bend;
-      if (k == kModelSteps || std::abs(step) < kSameAngle) break;
+      if (k == kModelTurns || std::abs(step) < kModelAngle) break;
       c = (c + step * e).normalized();
     }
     // As in local_model.h, with one angle to be found instead of two.
@@ -78,6 +74,38 @@ class Follower {
     return true;
   }
 
+  // Newton in the angle of c, by supports: also on creases and corners.
+  bool by_supports() {
+    SurfacePoint at{static_cast<int>(memory_.on_b.patch), memory_.on_b.u, memory_.on_b.v};
+    if (at.patch < 0 || at.patch >= static_cast<int>(shape_.patches.size())) return false;
+    if (shape_.support_excess > kSmallDent * tolerance_ * shape_.bounding_radius) return false;
+    Vec3 y = pose_.apart + axes_ * (particle_.scale * evaluate0(shape_.patches[at.patch], at.u, at.v));
+    y -= y.dot(pose_.axis) * pose_.axis;
+    Vec3 c = pose_.side * y.normalized();
+    for (int k = 1; k <= kRingSupports; ++k) {
+      const Vec3 e = pose_.axis.cross(c), asked = axes_.transpose() * c;
+      const Support s = find_hull_support(shape_, asked, &at, kRingSupport * shape_.bounding_radius);
+      const Vec3 point = axes_ * (particle_.scale * s.point), x = pose_.apart + point;
+      at = s.where;
+      Mat2 turn;
+      if (!support_turn(shape_, at, asked, asked, axes_.transpose() * e, axes_.transpose() * pose_.axis,
+                        particle_.scale, &turn))
+        return false;
+      const double f = c.dot(x), bend = turn(0, 0) - f, step = -e.dot(x) / bend;
+      if (!(-pose_.side * bend > 0) || !(std::abs(step) <= kLargestTurn)) return false;
+      if (std::abs(step) <= kRingAngle) {
+        set(pose_.side * pose_.radius - f, c, point, Rung::warm, k);
+        contact_.where = at;
+        memory_.on_b = {static_cast<double>(at.patch), at.u, at.v, {0, 0}};
+        store(particle_.q, memory_.proof.q_b);
+        drop_model(&memory_.model);
+        return true;
+      }
+      c = (c + step * e).normalized();
+    }
+    return false;
+  }
+
   // Lengths of the shape, its axes.
   bool newton() {
     SurfacePoint at = warm_point(memory_.on_b, shape_);
@@ -85,7 +113,7 @@ class Follower {
     const Vec3 axis = axes_.transpose() * pose_.axis,
                apart = axes_.transpose() * pose_.apart / particle_.scale;
     JetLanes jet;
-    for (int k = 1; k <= kSurfaceSteps; ++k) {
+    for (int k = 1; k <= kDistanceIterations; ++k) {
       evaluate2(shape_.patches[at.patch], at.u, at.v, &jet);
       using Slot = JetLanes::Slot;
       const Vec3 x = jet.at(Slot::kS), su = jet.at(Slot::kSu), sv = jet.at(Slot::kSv);
@@ -110,7 +138,8 @@ class Follower {
       const double chord2 = (c - n).squaredNorm();
       const SurfacePoint next{at.patch, at.u + du, at.v + dv};
       const bool inside = next.u >= 0 && next.u <= 1 && next.v >= 0 && next.v <= 1;
-      const bool last = inside ? step * step <= std::max(tolerance_, kRoundoff) : chord2 <= kAtRest * kAtRest;
+      const bool last =
+          inside ? step * step <= std::max(tolerance_, kRoundoff) : chord2 <= kRingAngle * kRingAngle;
       if (last && certain(at, n, r, chord2)) {
         const SurfacePoint before = at;
         Vec3 point = x;
@@ -132,10 +161,12 @@ class Follower {
     const RollingRadii radii = radii_at(shape_, at, nullptr, n);
     const double size = shape_.bounding_radius;
     const bool near = chord2 <= kNormalMargin * kNormalMargin && radii.near < kFarAway;
-    if (!near && shape_.dented()) return false;
+    if (!near && shape_.support_excess > kSmallDent * tolerance_ * size) return false;
     const double most = near ? radii.near : radii.outer;
     const double soft = pose_.side > 0 ? r - most : r;
-    if (!(soft > 0)) return false;  // nor where there is no such radius
+    // On flats and ruled lines there is no such radius; d . x is right to the slope times the body's size.
+    if (!(soft > 0) || !(most < kFarAway))
+      return chord2 <= std::min(kRingAngle * kRingAngle, 0.01 * tolerance_ * tolerance_);
     const double enough = std::max(tolerance_, kRoundoff) * size;
     return 0.5 * most * chord2 * (1 + most / soft) <= enough && chord2 * size <= enough;
   }
@@ -196,7 +227,7 @@ bool follow_on_cylinder(const Particle& particle, const CylinderPose& pose, cons
                         PairMemory* memory, CylinderContact* contact) {
   if (memory->proof.stamp != stamp_of(particle)) return false;
   Follower follower(particle, pose, settings, memory, contact);
-  return follower.local() || follower.newton();
+  return follower.local() || follower.newton() || follower.by_supports();
 }
 
 }  // namespace nurbs

@@ -19,7 +19,8 @@ namespace nurbs {
 struct CylinderPose {
   Vec3 axis, apart;
   double radius;
-  double side;  // 1: the body is inside, -1: outside
+  double side;   // 1: the body is inside, -1: outside
+  double noise;  // round-off of `apart` and of the body's reach, length
 };
 
 struct CylinderContact {

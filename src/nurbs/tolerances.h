@@ -186,6 +186,27 @@ constexpr double kForceDepth = 1e-3;       // of the smaller radius: overlaps ar
                                            // themselves, or times this if they are shallower
 constexpr double kLocalDrift = 20;         // of the tolerance that the contact points may be off
 
+// --- cylinders (angles of directions square to the axis)
+constexpr int kModelTurns = 3;           // of Newton over a local model: 1 or 2 are usual
+constexpr int kDistanceIterations = 5;   // of Newton for the distance from the axis; the next way takes over
+constexpr int kRingSupports = 6;         // of Newton over supports
+constexpr double kModelAngle = 1e-13;    // of that over a model: found
+constexpr double kRingAngle = 1e-10;     // of the others: the evaluated point is the answer
+constexpr double kRingSupport = 1e-10;   // what a support may lack
+constexpr double kSmallDent = 0.01;      // of the tolerance: what dents may take from one
+constexpr double kSameMaximum = 1e-9;    // maxima of the reach this near are one
+constexpr double kCoarsestRing = 0.79;   // between directions where maxima are looked for first ...
+constexpr double kRingLadder = 2.5;      // ... or factor between those about a known one ...
+constexpr double kNearKnown = 0.5;       // ... up to here
+constexpr double kFinestRing = 2e-3;     // maxima closer than this, or ...
+constexpr double kNearestOnWall = 0.02;  // ... than this on the wall, a length, are found as one
+constexpr double kNarrowArc = 0.1;       // arcs up to this wide may be proven to have one maximum
+constexpr double kLooseArc = 0.01;    // ... and those where the reach is little below the radius are halved
+constexpr double kSurveyRoom = 4e-3;  // that a body may move from where the circle was surveyed ...
+constexpr double kOpenSurveyRoom = 3e-4;  // ... or where its contacts are not proven alone
+constexpr double kRingNormals = 0.011;  // between normals looked up: half of it and kSurveyRoom are less than
+                                        // kNormalMargin
+
 // --- polytope method
 constexpr int kHullVertices = 768;      // support pairs a fallback may spend; 20 to 80 are usual
 constexpr int kHullFaces = 3072;        // twice the vertices, and room for those being replaced

@@ -130,7 +130,8 @@ void SurfaceWall::find_for(int body, const ContactStages::Step& step,
   if (!finite(particle)) return stages->give(body, head, nullptr, 0);
   if (kind_ == Kind::cylinder)
     find_cylinder_contacts(particle, origin_, axis_, radius_, step.settings,
-                           step.bodies->path()[body] + path_, former, formers, &contacts_);
+                           step.bodies->path()[body] + path_, former, formers, survey_of(body, particle),
+                           &contacts_);
   else
     find_in_mesh(body, step, meshes, former, formers);
   expiry_[body] = contacts_.expiry;
@@ -160,6 +161,17 @@ void SurfaceWall::find_for(int body, const ContactStages::Step& step,
     motion_at(c, r.point_a, body, meshes, &f);
   }
   stages->give(body, head, found_, contacts_.count, kind_ == Kind::mesh && edged(*particle.shape));
+}
+
+// What a body keeps of a tube from step to step, if it does.
+TubeSurvey* SurfaceWall::survey_of(int body, const Particle& particle) {
+  if (!wants_survey(particle, radius_)) return nullptr;
+  if (patch_of_[body] < 0) {
+    if (patches_used_ == static_cast<int>(surveys_.size())) surveys_.emplace_back();
+    patch_of_[body] = patches_used_++;
+    surveys_[patch_of_[body]].room = 0;
+  }
+  return &surveys_[patch_of_[body]];
 }
 
 // The piece of the wall that a contact is with, whatever else is near.
@@ -249,6 +261,7 @@ std::size_t SurfaceWall::bytes() const {
   std::size_t sum = near_.capacity() * sizeof(Near) + first_.capacity() * sizeof(int) +
                     expiry_.capacity() * (sizeof(double) + sizeof(int));
   for (const auto& patch : patches_) sum += patch->mesh.bytes();
+  sum += surveys_.size() * sizeof(TubeSurvey);
   return sum;
 }
 

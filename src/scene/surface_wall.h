@@ -7,7 +7,7 @@
 #include <memory>
 #include <vector>
 
-#include "contact/surface_search.h"
+#include "contact/tube_search.h"
 #include "scene/contact_stages.h"
 
 namespace nurbs {
@@ -71,6 +71,7 @@ class SurfaceWall {
   void choose(const BodyRecord& body, int number, double path, const std::vector<TriangleArray>& meshes,
               Patch* patch) const;
   void gather(const Patch& patch, const std::vector<TriangleArray>& meshes);
+  TubeSurvey* survey_of(int body, const Particle& particle);
   std::uint64_t name_of(const SurfaceContact& c, int body, const std::vector<TriangleArray>& meshes) const;
   void motion_at(const SurfaceContact& c, const Vec3& point, int body,
                  const std::vector<TriangleArray>& meshes, WallContact* out) const;
@@ -82,8 +83,9 @@ class SurfaceWall {
   std::vector<Near> near_;      // by body
   std::vector<int> first_;      // of each body in near_
   std::vector<double> expiry_;  // path up to which a body is clear of the wall
-  std::vector<int> patch_of_;   // body to patch, -1: not made
+  std::vector<int> patch_of_;   // body to patch or survey, -1: not made
   std::vector<std::unique_ptr<Patch>> patches_;
+  std::deque<TubeSurvey> surveys_;  // of a tube
   int patches_used_ = 0, bodies_near_ = 0, overflows_ = 0;
   double path_ = 0;  // of the wall since the last end_near
   std::vector<Triangle> triangles_;

@@ -50,7 +50,7 @@ TEST(CylinderSearch, contacts_inside_are_the_maxima_of_the_reach) {
     const std::vector<double> f = reaches(p, origin, u, v);
     const double most = *std::max_element(f.begin(), f.end()), coarse = radius * std::pow(M_PI / kAround, 2);
     SurfaceContacts found;
-    find_cylinder_contacts(p, origin, axis, radius, {}, 5, nullptr, 0, &found);
+    find_cylinder_contacts(p, origin, axis, radius, {}, 5, nullptr, 0, nullptr, &found);
     if (std::abs(most - radius) < 2 * coarse) continue;
     SCOPED_TRACE(shape.name + " " + std::to_string(n));
     ASSERT_EQ(found.count > 0, most > radius);
@@ -117,16 +117,21 @@ TEST(CylinderSearch, a_round_body_on_the_axis_of_a_narrower_tube_has_one_contact
     const double reach = -gap_along(p, origin, -axis.unitOrthogonal(), nullptr).gap, radius = 0.97 * reach;
     SCOPED_TRACE(shape.name + " " + std::to_string(n));
     SurfaceContacts found;
-    find_cylinder_contacts(p, origin, axis, radius, {}, 5, nullptr, 0, &found);
+    find_cylinder_contacts(p, origin, axis, radius, {}, 5, nullptr, 0, nullptr, &found);
     ASSERT_EQ(found.count, 1);
     EXPECT_NEAR(found.contact[0].gap, radius - reach, 1e-12 * reach);
     const Vec3 aside = axis.unitOrthogonal();
     p.x += 1e-6 * reach * aside;
-    find_cylinder_contacts(p, origin, axis, radius, {}, 5, nullptr, 0, &found);
+    find_cylinder_contacts(p, origin, axis, radius, {}, 5, nullptr, 0, nullptr, &found);
     ASSERT_EQ(found.count, 1);
     EXPECT_NEAR(found.contact[0].gap, radius - (1 + 1e-6) * reach, 1e-12 * reach);
     EXPECT_NEAR(-found.contact[0].normal.dot(aside), 1, 1e-8);
   }
+}
+
+Vec3 across(const Particle& p, const Vec3& origin, const Vec3& axis) {
+  const Vec3 apart = p.x - origin;
+  return apart - apart.dot(axis) * axis;
 }
 
 // What a wall keeps of a body from step to step.
@@ -136,12 +141,17 @@ class Follower {
     FormerContact former[kSurfaceContacts];
     const int count = last_.count;
     for (int k = 0; k < count; ++k) former[k] = {last_.contact[k].normal, &last_.contact[k].memory, false};
-    find_cylinder_contacts(p, origin, axis, radius, ContactSettings{}, 5, former, count, out);
+    find_cylinder_contacts(p, origin, axis, radius, ContactSettings{}, 5, former, count, &survey_, out);
+    kept_ = survey_.room > 0 && survey_.pose.apart != across(p, origin, axis);
     last_ = *out;
   }
+  // Whether the circle was not surveyed anew.
+  bool kept() const { return kept_; }
 
  private:
   SurfaceContacts last_;
+  TubeSurvey survey_;
+  bool kept_ = false;
 };
 
 // A body that is turned and moved about by 1e-7 to 0.1 rad a step, in spells, through contact and out of it.
@@ -171,12 +181,29 @@ class Tumbling {
     ahead_ = Eigen::AngleAxisd(turn_ * size / radius, axis) * ahead_;
     along_ += 0.1 * turn_ * size;
     p.x = Vec3::Zero();
-    const double reach = -gap_along(p, Vec3::Zero(), -side_ * ahead_, nullptr).gap;
+    double reach = -HUGE_VAL;
+    for (int k = -3; k <= 3; ++k) {
+      const Vec3 d = side_ * (Eigen::AngleAxisd(0.02 * k * size / radius, axis) * ahead_);
+      reach = std::max(reach, -gap_along(p, Vec3::Zero(), -d, nullptr).gap);
+    }
     p.x = origin + along_ * axis + (radius - side_ * (reach + gap_)) * ahead_;
   }
 
+  // Turns a direction of the body to the wall, or along the axis, but for `off` rad.
+  void lean(const Vec3& n, bool along, double off) {
+    const Vec3 to = (along ? axis : ahead_) + off * random_.direction();
+    p.q = Quat::FromTwoVectors(n, to.normalized());
+  }
+  bool inside() const { return (p.x - origin).cross(axis).norm() < radius; }
   // An upper bound of the gap.
-  double apart() const { return std::max(0.0, gap_); }
+  double apart() const {
+    double reach = -HUGE_VAL;
+    for (int k = -50; k <= 50; ++k) {
+      const Vec3 d = Eigen::AngleAxisd(0.002 * k, axis) * ahead_;
+      reach = std::max(reach, -gap_along(p, origin, -d, nullptr).gap);
+    }
+    return inside() ? std::max(0.0, radius - reach) : HUGE_VAL;
+  }
 
   Particle p;
   Vec3 origin, axis;
@@ -190,10 +217,21 @@ class Tumbling {
   int left_ = 0;
 };
 
+// By how much the reach falls between two contacts, below the lesser of them.
+double fall_between(const Tumbling& body, const Vec3& n, const Vec3& m) {
+  const auto reach = [&](const Vec3& d) { return -gap_along(body.p, body.origin, -d, nullptr).gap; };
+  const double angle = std::atan2(body.axis.dot(n.cross(m)), n.dot(m));
+  double least = HUGE_VAL;
+  for (int k = 0; k <= 200; ++k)
+    least = std::min(least, reach(Eigen::AngleAxisd(angle * k / 200, body.axis) * -n));
+  return std::min(reach(-n), reach(-m)) - least;
+}
+
 // Contacts as a search from scratch finds them, to the default tolerance. One that is shallower than it may
-// be missing.
-void expect_same(const SurfaceContacts& found, const SurfaceContacts& reference, const Tumbling& body) {
+// be missing, and so may one that the reach hardly falls from to another. Returns how many are.
+int expect_same(const SurfaceContacts& found, const SurfaceContacts& reference, const Tumbling& body) {
   const double allowed = 2e-9 * body.size;
+  int merged = 0;
   for (const bool back : {false, true}) {
     const SurfaceContacts &one = back ? reference : found, &other = back ? found : reference;
     for (int k = 0; k < one.count; ++k) {
@@ -208,14 +246,28 @@ void expect_same(const SurfaceContacts& found, const SurfaceContacts& reference,
         EXPECT_LT(-c.gap, allowed) << (back ? "lost" : "made up");
         continue;
       }
+      if (nearest > 1e-7 && -c.gap < allowed) continue;
+      if (nearest > 1e-7 && body.inside()) {
+        // As F'' >= -F, a maximum is at most this above a minimum that far away.
+        const double small = 0.5 * body.radius * std::pow(std::max(2e-3, 0.02 * body.size / body.radius), 2);
+        EXPECT_LT(fall_between(body, c.normal, same->normal), back ? small : 10 * small)
+            << (back ? "missing, " : "extra, ") << nearest << " away, gaps " << c.gap / body.size << " "
+            << same->gap / body.size << ", tube " << body.radius / body.size << ", contacts " << found.count
+            << " and " << reference.count;
+        ++merged;
+        continue;
+      }
       EXPECT_NEAR(c.gap, same->gap, allowed);
-      EXPECT_LT(nearest, 1e-8);
-      EXPECT_LT((c.on_body - same->on_body).norm(), 1e-6 * body.size);
+      EXPECT_LT(nearest, 1e-7);
+      if (nearest < 1e-8) {
+        EXPECT_LT((c.on_body - same->on_body).norm(), 1e-6 * body.size);
+      }
     }
   }
   if (found.count == 0) {
     EXPECT_LE(found.expiry - 5, (1 + 1e-6) * body.apart());
   }
+  return merged;
 }
 
 TEST(CylinderSearch, contacts_of_round_bodies_are_followed) {
@@ -231,8 +283,9 @@ TEST(CylinderSearch, contacts_of_round_bodies_are_followed) {
       SCOPED_TRACE(shape.name + " " + std::to_string(n) + " step " + std::to_string(k));
       SurfaceContacts found, reference;
       follower.find(body.p, body.origin, body.axis, body.radius, &found);
-      find_cylinder_contacts(body.p, body.origin, body.axis, body.radius, {}, 5, nullptr, 0, &reference);
-      expect_same(found, reference, body);
+      find_cylinder_contacts(body.p, body.origin, body.axis, body.radius, {}, 5, nullptr, 0, nullptr,
+                             &reference);
+      EXPECT_EQ(expect_same(found, reference, body), 0);
       for (int j = 0; j < found.count; ++j) {
         ++touching;
         followed += found.contact[j].iterations > 0;
@@ -244,6 +297,44 @@ TEST(CylinderSearch, contacts_of_round_bodies_are_followed) {
   EXPECT_GT(touching, 6000);
   EXPECT_GT(followed, 0.2 * touching);
   EXPECT_GT(modelled, 0.4 * touching);
+}
+
+// Tablets, boxes and the like, also flat on the wall and along the axis. Mostly the circle is not looked at
+// again.
+TEST(CylinderSearch, contacts_of_bodies_with_flats_are_followed) {
+  Random random(10);
+  int touching = 0, several = 0, merged = 0, steps = 0, kept = 0;
+  const ShapePointer shapes[] = {make_shape("tablet", rounded_cylinder(1, 0.4, 0.15)),
+                                 make_shape("box", rounded_box(Vec3(1, 0.8, 0.6), 0.1)),
+                                 cuboid(),
+                                 make_shape("can", cylinder(0.5, 1.2)),
+                                 kinked(),
+                                 disc()};
+  for (int n = 0; n < 480; ++n) {
+    const Shape& shape = *shapes[n % 6];
+    Tumbling body(random, shape, n % 16 == 15 ? -1 : 1);
+    if (n / 6 % 3 > 0)
+      body.lean(n % 2 ? Vec3::UnitX() : Vec3::UnitZ(), n / 6 % 3 == 1, random.log_uniform(1e-7, 0.1));
+    Follower follower;
+    for (int k = 0; k < 60; ++k) {
+      body.step();
+      SCOPED_TRACE(shape.name + " " + std::to_string(n) + " step " + std::to_string(k));
+      SurfaceContacts found, reference;
+      follower.find(body.p, body.origin, body.axis, body.radius, &found);
+      find_cylinder_contacts(body.p, body.origin, body.axis, body.radius, {}, 5, nullptr, 0, nullptr,
+                             &reference);
+      merged += expect_same(found, reference, body);
+      ++steps;
+      touching += found.count > 0;
+      several += found.count > 1;
+      kept += follower.kept();
+      if (HasFailure()) return;
+    }
+  }
+  EXPECT_GT(touching, 0.6 * steps);
+  EXPECT_GT(several, 0.02 * steps);
+  EXPECT_LT(merged, 0.003 * steps);
+  EXPECT_GT(kept, 0.3 * steps);
 }
 
 }  // namespace

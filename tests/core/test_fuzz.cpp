@@ -278,7 +278,8 @@ TEST(Fuzz, edges_vertices_and_cylinders) {
         ASSERT_LE(c.on_body.norm(), 1.001 * size) << shape->name;
       }
       SurfaceContacts contacts;
-      find_cylinder_contacts(p, a, along, size * random.log_uniform(1e-3, 1e3), {}, 0, nullptr, 0, &contacts);
+      find_cylinder_contacts(p, a, along, size * random.log_uniform(1e-3, 1e3), {}, 0, nullptr, 0, nullptr,
+                             &contacts);
       for (int i = 0; i < contacts.count; ++i) {
         ASSERT_TRUE(std::isfinite(contacts.contact[i].gap)) << shape->name;
         ASSERT_NEAR(contacts.contact[i].normal.norm(), 1, 1e-9) << shape->name;
