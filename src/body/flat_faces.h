@@ -5,12 +5,13 @@
 #include <vector>
 
 #include "body/convex_polygon.h"
+#include "body/direction_atlas.h"
 #include "nurbs/types.h"
 
 namespace nurbs {
 
 struct Shape;
-struct SurfacePoint;
+struct Support;
 
 // How far a face may be from its plane and a line from straight, in bounding radii: room for the decimals of
 // a shape file. A contact's gap on such a face errs by as much.
@@ -81,8 +82,13 @@ struct SupportSet {
   int face = -1;                // the face, if it is one
   bool ruled = false;           // a segment that stays on the body only as long as d does
   double h = 0;                 // support function, at the ...
-  Vec3 support = Vec3::Zero();  // ... support point
+  Vec3 support = Vec3::Zero();  // ... support point, and ...
+  SurfacePoint where;           // ... where it lies
 };
 SupportSet support_set(const Shape& shape, const Vec3& d, double tolerance);
+
+// The least tolerance with which support_set() is more than a point; infinite without flat features near. No
+// search: `support` is that along d.
+double feature_lag(const Shape& shape, const Vec3& d, const Support& support);
 
 }  // namespace nurbs

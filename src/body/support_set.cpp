@@ -107,6 +107,7 @@ SupportSet support_set(const Shape& shape, const Vec3& d, double tolerance) {
   const FlatFeatures& flats = shape.flats;
   const Support support = find_hull_support(shape, d);
   SupportSet set;
+  set.where = support.where;
   set.h = support.h;
   set.support = support.point;
   const double least = set.h - tolerance;
@@ -142,6 +143,24 @@ SupportSet support_set(const Shape& shape, const Vec3& d, double tolerance) {
   set_point(set, 0, support.point, -1);
   set.count = 1;
   return set;
+}
+
+double feature_lag(const Shape& shape, const Vec3& d, const Support& support) {
+  const FlatFeatures& flats = shape.flats;
+  double highest = -std::numeric_limits<double>::infinity();  // of the features' lowest points
+  const int f = nearest_face(flats, d, kFaceCosine);
+  if (f >= 0) {
+    double lowest = std::numeric_limits<double>::infinity();
+    for (const int v : flats.faces[f].corners) lowest = std::min(lowest, d.dot(flats.vertices[v]));
+    highest = lowest;
+  }
+  for (const StraightEdge& edge : flats.edges)
+    highest =
+        std::max(highest, std::min(d.dot(flats.vertices[edge.ends[0]]), d.dot(flats.vertices[edge.ends[1]])));
+  RuledLine line;
+  if (ruled_line(shape, support.where, d, M_PI / 4, &line))
+    highest = std::max(highest, std::min(d.dot(line.ends[0]), d.dot(line.ends[1])));
+  return support.h - highest;
 }
 
 }  // namespace nurbs

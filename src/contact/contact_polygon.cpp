@@ -17,11 +17,9 @@ constexpr double kLineAngle = 0.8;   // rad, the same for the normal of a ruled 
 constexpr double kThinnest = 1e-7;   // width to length of a polygon below which it is a segment
 constexpr double kInfinite = std::numeric_limits<double>::infinity();
 
-// Rooms by which a polygon is looked for to be out of reach, in smaller bounding radii, widest first; and the
-// share of one that bodies may go: reach and overlap grow by up to five times the way, heights on inclined
-// faces change by more than it.
-constexpr double kRooms[] = {0.3, 0.03, 3e-3};
-constexpr double kWayShare = 0.1;
+// Share of the room to a polygon, at most kMostRoom smaller bounding radii, that bodies may go: reach and
+// overlap grow by up to five times the way, heights on inclined faces change by more than it.
+constexpr double kWayShare = 0.1, kMostRoom = 0.3;
 
 void store(const Vec3& v, double* out) {
   for (int k = 0; k < 3; ++k) out[k] = v[k];
@@ -182,30 +180,27 @@ class FaceContact {
     slack_ = kClipSlack * std::max(reference.radius(), incident.radius());
   }
 
-  double deepest_gap() const { return gap_below(incident_, plane_); }
+  // Overlap along the face's normal; where it exceeds `most`, a lower bound above that may be given.
+  double depth(double most) const {
+    const Shape& shape = *incident_.shape;
+    const Vec3 d = incident_.turned_back(-plane_.normal);
+    const Vec3& node = shape.atlas.point[shape.atlas.nearest(d)];
+    const double least = -plane_.height(incident_.place(node));
+    return least > most ? least : -gap_below(incident_, plane_);
+  }
 
-  // Whether make() must fail as long as no point of either body goes further than `room` (length): of all
-  // that may then lie over the reference face, some that is sure to is higher than `most`.
-  bool is_out_of_reach(double most, double room) {
+  // How far all points of both bodies may go while something of whatever may lie over the reference face is
+  // sure to be higher than `most`, so that make() fails; 0 where that is not seen.
+  double room(double most) {
     set_window();
-    const Vec2 centre = polygon_centroid(window_);
-    ConvexPolygon middle;
-    middle.add(centre, 0, 0);
-    const double inner_radius = depth_inside(window_, middle);
-    if (!(inner_radius > room)) return false;
-    const auto scaled = [&](double by) {
-      ConvexPolygon p = window_;
-      for (int i = 0; i < p.count; ++i) p.corner[i] = centre + by * (p.corner[i] - centre);
-      return p;
-    };
-    const Windows windows{scaled(1 + room / inner_radius), scaled(1 - room / inner_radius)};
-    if (face_may_be_near(windows, most)) return false;
-    for (const StraightEdge& edge : incident_.shape->flats.edges)
-      if (segment_may_be_near(windows, {incident_.vertex(edge.ends[0]), incident_.vertex(edge.ends[1])},
-                              most))
-        return false;
+    double least = face_room(opposite(), most);
+    for (const StraightEdge& edge : incident_.shape->flats.edges) {
+      if (!(least > 0)) return 0;
+      least = std::min(least,
+                       segment_room({incident_.vertex(edge.ends[0]), incident_.vertex(edge.ends[1])}, most));
+    }
     RuledLine line;
-    return !incident_line(&line) || !segment_may_be_near(windows, line.ends, most);
+    return least > 0 && incident_line(&line) ? std::min(least, segment_room(line.ends, most)) : least;
   }
 
   // `swallowed`: the reference face lies inside the incident one.
@@ -269,32 +264,49 @@ class FaceContact {
            plane_.level;
   }
 
-  // What surely contains, and what surely is part of, the reference face wherever it goes.
-  struct Windows {
-    ConvexPolygon wide, narrow;
-  };
-  bool face_may_be_near(const Windows& windows, double most) const {
-    const Opposite o = opposite();
-    if (o.face < 0 || intersect(o.outline, windows.wide, slack_).count < 3) return false;
-    const ConvexPolygon cut = intersect(o.outline, windows.narrow, slack_);
-    return std::none_of(cut.corner, cut.corner + cut.count,
-                        [&](const Vec2& at) { return height(o, at) > most; });
+  // How deep a place is inside the reference face.
+  double inside(const ConvexPolygon& polygon, const Vec2& at) const {
+    ConvexPolygon point;
+    point.add(at, 0, 0);
+    return depth_inside(polygon, point);
   }
-  bool segment_may_be_near(const Windows& windows, const Vec3 (&ends)[2], double most) const {
+  // Of room(): the face opposite is either elsewhere, or has a place over the reference that is high.
+  double face_room(const Opposite& o, double most) const {
+    if (o.face < 0) return kInfinite;
+    const Vec2 middle = plane_.project(reference_.place(face_.centroid)),
+               other = plane_.project(incident_.place(incident_.shape->flats.faces[o.face].centroid));
+    const auto radius = [](const ConvexPolygon& p, const Vec2& centre) {
+      double most2 = 0;
+      for (int i = 0; i < p.count; ++i) most2 = std::max(most2, (p.corner[i] - centre).squaredNorm());
+      return std::sqrt(most2);
+    };
+    double best = (middle - other).norm() - radius(window_, middle) - radius(o.outline, other);
+    if (best > 0) return best;
+    for (const double t : {0.0, 0.5, 1.0}) {
+      const Vec2 at = middle + t * (other - middle);
+      const double high = height(o, at) - most;
+      if (high > best) best = std::max(best, std::min({high, inside(window_, at), inside(o.outline, at)}));
+    }
+    return std::max(best, 0.0);
+  }
+  double segment_room(const Vec3 (&ends)[2], double most) const {
     const Vec3 p = incident_.place(ends[0]), q = incident_.place(ends[1]);
     const double gap_p = plane_.height(p), gap_q = plane_.height(q);
-    if (std::min(gap_p, gap_q) > most) return false;
+    double best = std::min(gap_p, gap_q) - most;
+    if (best > 0) return best;
     const Vec2 at_p = plane_.project(p), at_q = plane_.project(q);
     SegmentPart part;
-    if (!clip_segment(windows.wide, at_p, at_q, slack_, &part)) return false;
-    if (!clip_segment(windows.narrow, at_p, at_q, slack_, &part)) return true;
-    const auto gap = [&](double t) { return gap_p + t * (gap_q - gap_p); };
-    return std::max(gap(part.t0), gap(part.t1)) <= most;
+    if (!clip_segment(window_, at_p, at_q, slack_, &part)) return 0;
+    for (const double s : {0.1, 0.5, 0.9}) {
+      const double t = part.t0 + s * (part.t1 - part.t0), high = gap_p + t * (gap_q - gap_p) - most;
+      if (high > best) best = std::max(best, std::min(high, inside(window_, at_p + t * (at_q - at_p))));
+    }
+    return std::max(best, 0.0);
   }
 
   bool face_points(double most, bool* swallowed) {
     const Opposite o = opposite();
-    if (o.face < 0) return false;
+    if (o.face < 0 || face_room(o, most) > 0) return false;
     const FlatFace& face = incident_.shape->flats.faces[o.face];
     const ConvexPolygon cut = intersect(o.outline, window_, slack_);
     if (cut.count < 3) return false;
@@ -409,23 +421,22 @@ class FaceContact {
   int ring_ = -1;  // the incident face if it is round
 };
 
-// A crease or ruled line of a body that supports it in lab direction d, to `tolerance`.
 struct Line {
   Vec3 ends[2];  // lab, from A's centre of mass
   int vertex[2];
   bool ruled;
 };
 
-// The points of its support set: 2 where it is a line.
-int support_line(const Body& body, const Vec3& d, double tolerance, Line* line) {
+// A crease or ruled line that supports the body in lab direction d, to `tolerance`.
+bool support_line(const Body& body, const Vec3& d, double tolerance, Line* line) {
   const SupportSet set = support_set(*body.shape, body.turned_back(d), tolerance / body.frame.scale);
-  if (set.count != 2) return set.count;
+  if (set.count != 2) return false;
   for (int i = 0; i < 2; ++i) {
     line->ends[i] = body.place(set.point[i]);
     line->vertex[i] = set.vertex[i];
   }
   line->ruled = set.ruled;
-  return 2;
+  return true;
 }
 
 // Two lines: the reference plane goes through A's, as square to the contact's normal as it can.
@@ -448,27 +459,35 @@ LinePair pair_of(const Line& a, const Line& b, const Vec3& d) {
   return lines;
 }
 
-// Whether line_contact() must fail as long as no point goes further than `room`.
-bool lines_are_out_of_reach(const Body& a, const Body& b, const Vec3& d, double reach, double room) {
-  Line on_a, on_b;
-  const int points_a = support_line(a, d, reach + room, &on_a);
-  if (points_a < 2) return true;
-  const int points_b = support_line(b, -d, reach + room, &on_b);
-  return points_b < 2 ||
-         (points_a == 2 && points_b == 2 && pair_of(on_a, on_b, d).aside() > reach + 2 * room);
-}
-
-// Two parallel lines.
+// Two parallel lines. `room`, where there are none: how far points may go before there may be.
 bool line_contact(const Body& a, const Body& b, const Vec3& d, double overlap, double reach,
-                  ContactPolygon* out) {
+                  const SurfacePoint* starts, ContactPolygon* out, double* room) {
+  // Both bodies need a feature that lags no more than that behind their support.
+  const auto lag = [](const Body& body, const Vec3& along, const SurfacePoint* start) {
+    const Vec3 on_body = body.turned_back(along);
+    return body.frame.scale *
+           feature_lag(*body.shape, on_body, find_hull_support(*body.shape, on_body, start));
+  };
+  const FlatFeatures &flats_a = a.shape->flats, &flats_b = b.shape->flats;
+  *room = kInfinite;
+  if ((flats_a.edges.empty() && flats_a.ruling.empty()) || (flats_b.edges.empty() && flats_b.ruling.empty()))
+    return false;
+  *room = lag(a, d, starts ? &starts[0] : nullptr) - reach;
+  if (*room > 0) return false;
+  *room = lag(b, -d, starts ? &starts[1] : nullptr) - reach;
+  if (*room > 0) return false;
+  *room = 0;
   Line on_a, on_b;
-  if (support_line(a, d, reach, &on_a) != 2 || support_line(b, -d, reach, &on_b) != 2) return false;
+  if (!support_line(a, d, reach, &on_a) || !support_line(b, -d, reach, &on_b)) return false;
   const LinePair lines = pair_of(on_a, on_b, d);
   const ReferencePlane& plane = lines.plane;
   const double length = lines.length;
   const Vec2 &p = lines.p, &q = lines.q;
   // Lines further apart sideways than this touch at one point.
-  if (lines.aside() > reach) return false;
+  if (lines.aside() > reach) {
+    *room = 0.5 * (lines.aside() - reach);
+    return false;
+  }
   Candidates points;
   bool whole = true;
   for (int i = 0; i < 2; ++i) {
@@ -508,12 +527,12 @@ namespace {
 
 // How far a body may go before it has a flat feature within reach of a plane, where it has none now. `d`:
 // towards the plane, shape axes.
-double clear_way(const Particle& particle, const Vec3& d, double reach) {
-  const double radius = particle.shape->bounding_radius;
-  for (const double share : kRooms)
-    if (support_set(*particle.shape, d, reach / particle.scale + share * radius).count < 2)
-      return kWayShare * share * particle.scale * radius;
-  return 0;
+double clear_way(const Particle& particle, const Vec3& d, double reach, const SupportSet& point) {
+  Support support;
+  support.where = point.where;
+  support.h = point.h;
+  const double room = feature_lag(*particle.shape, d, support) - reach / particle.scale;
+  return kWayShare * particle.scale * std::clamp(room, 0.0, kMostRoom * particle.shape->bounding_radius);
 }
 
 }  // namespace
@@ -528,7 +547,7 @@ bool make_plane_polygon(const Particle& particle, const Vec3& origin, const Vec3
   const Vec3 d = frame.axes.transpose() * -normal;
   const SupportSet set = support_set(shape, d, reach / frame.scale);
   if (set.count < 2) {
-    if (clear) *clear = clear_way(particle, d, reach);
+    if (clear) *clear = clear_way(particle, d, reach, set);
     return false;
   }
   const auto height = [&](const Vec3& s) {
@@ -678,7 +697,7 @@ RegionContact make_region_polygon(const Particle& particle, const PlaneRegion& r
   const Vec3 d = body.axes.transpose() * -region.normal;
   const SupportSet set = support_set(shape, d, reach / body.scale);
   if (set.count < 2) {
-    if (clear) *clear = clear_way(particle, d, reach);
+    if (clear) *clear = clear_way(particle, d, reach, set);
     return RegionContact::point;
   }
   const auto whole = [&](double room) {
@@ -732,7 +751,8 @@ RegionContact make_region_polygon(const Particle& particle, const PlaneRegion& r
 }
 
 bool make_pair_polygon(const Particle& pa, const Particle& pb, const Vec3& normal, double overlap,
-                       double reach, const ContactPolygon* old, ContactPolygon* out, double* clear) {
+                       double reach, const ContactPolygon* old, ContactPolygon* out, double* clear,
+                       const SurfacePoint* starts) {
   *out = {};
   if (clear) *clear = 0;
   if (pa.shape->flats.empty() || pb.shape->flats.empty()) return false;
@@ -740,9 +760,9 @@ bool make_pair_polygon(const Particle& pa, const Particle& pb, const Vec3& norma
   const int face_a = nearest_face(a.shape->flats, a.turned_back(normal), kFaceCosine);
   const int face_b = nearest_face(b.shape->flats, b.turned_back(-normal), kFaceCosine);
   double depth[2] = {kInfinite, kInfinite};  // along the normals of the two faces
-  if (face_a >= 0) depth[0] = -FaceContact(a, a.shape->flats.faces[face_a], b).deepest_gap();
-  if (face_b >= 0) depth[1] = -FaceContact(b, b.shape->flats.faces[face_b], a).deepest_gap();
   const double most = overlap + reach;
+  if (face_a >= 0) depth[0] = FaceContact(a, a.shape->flats.faces[face_a], b).depth(most);
+  if (face_b >= 0) depth[1] = FaceContact(b, b.shape->flats.faces[face_b], a).depth(most);
   int first = old && old->count > 0 && old->reference == 1 ? 1 : 0;
   if (!(depth[first] <= most) || depth[1 - first] < depth[first] - kReferenceShare * overlap)
     first = 1 - first;
@@ -762,20 +782,16 @@ bool make_pair_polygon(const Particle& pa, const Particle& pb, const Vec3& norma
     return true;
   }
   if (attempt(1 - first, out, &swallowed)) return true;
-  if (line_contact(a, b, normal, overlap, reach, out)) return true;
+  double room = 0;
+  if (line_contact(a, b, normal, overlap, reach, starts, out, &room)) return true;
   *out = {};
   if (!clear) return false;
+  for (const int reference : {0, 1})
+    if (room > 0)
+      room = std::min(
+          room, depth[reference] > most ? depth[reference] - most : contact(reference).room(reach - overlap));
   const double smaller = std::min(a.radius(), b.radius()), larger = std::max(a.radius(), b.radius());
-  for (const double share : kRooms) {
-    const double room = share * smaller;
-    const auto away = [&](int reference) {
-      return depth[reference] > most + room ||
-             contact(reference).is_out_of_reach(reach - overlap + room, room);
-    };
-    if (!away(0) || !away(1) || !lines_are_out_of_reach(a, b, normal, reach, room)) continue;
-    *clear = kWayShare * room * smaller / larger;
-    break;
-  }
+  *clear = kWayShare * std::min(room, kMostRoom * smaller) * smaller / larger;
   return false;
 }
 

@@ -125,9 +125,10 @@ RegionContact make_region_polygon(const Particle& particle, const PlaneRegion& r
 // is clipped instead. Without a face, two parallel lines give the segment they share, with A's line in the
 // reference plane. Crossing edges, and corners on faces, are single points: false, count = 0. 1.5 us
 // for two boxes, 15 to 30 us for discs and rounded boxes, of which support searches from cold starts are the
-// most.
+// most. `starts`: surface points of A and B near the contact, where searches begin; may be null.
 bool make_pair_polygon(const Particle& a, const Particle& b, const Vec3& normal, double overlap, double reach,
-                       const ContactPolygon* old, ContactPolygon* out, double* clear = nullptr);
+                       const ContactPolygon* old, ContactPolygon* out, double* clear = nullptr,
+                       const SurfacePoint* starts = nullptr);
 
 // Where the points are now. Of a whole round face the normal springs stand on all the points of its outline
 // (64, fixed weights FlatFace::weight), so that it has no preferred directions and never needs a remake while

@@ -296,7 +296,8 @@ class ContactStages {
   bool may_be_flat(int a, int b) const;
   Vec3 wall_frame(int a) const;
   bool find_polygon(int a, int b, const Vec3& normal, double overlap, double reach, const ContactPolygon* old,
-                    ContactPolygon* polygon, double* clear = nullptr) const;
+                    ContactPolygon* polygon, double* clear = nullptr,
+                    const SurfacePoint* starts = nullptr) const;
   void finish(const ContactCoefficients& law, int a, int b, const ContactState& state);
   bool make_flat(ContactBlock& block, int lane, const Results& single);
   struct LeftPolygon {  // what a polygon leaves behind

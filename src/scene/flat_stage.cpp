@@ -81,7 +81,8 @@ PolygonState ContactStages::polygon_state(const ContactPolygon& polygon, int b, 
 
 // The polygon of two bodies that touch, or of a body and the wall; false where they meet at a point.
 bool ContactStages::find_polygon(int a, int b, const Vec3& normal, double overlap, double reach,
-                                 const ContactPolygon* old, ContactPolygon* polygon, double* clear) const {
+                                 const ContactPolygon* old, ContactPolygon* polygon, double* clear,
+                                 const SurfacePoint* starts) const {
   const Particle body = step_.bodies->particle(b);
   if (a < -1) {
     const PlaneRegion* region = partners_[-2 - a].region;
@@ -92,7 +93,8 @@ bool ContactStages::find_polygon(int a, int b, const Vec3& normal, double overla
   }
   const bool made =
       a < 0 ? make_plane_polygon(body, load(step_.wall->x), step_.wall_normal, reach, polygon, clear)
-            : make_pair_polygon(step_.bodies->particle(a), body, normal, overlap, reach, old, polygon, clear);
+            : make_pair_polygon(step_.bodies->particle(a), body, normal, overlap, reach, old, polygon, clear,
+                                starts);
   return made && polygon->count >= 2;
 }
 
@@ -116,7 +118,11 @@ bool ContactStages::make_flat(ContactBlock& block, int lane, const Results& sing
   const double overlap = -single.gap[lane];
   ContactPolygon polygon;
   double clear = 0;
-  if (!find_polygon(a, b, normal, overlap, kReach * overlap, nullptr, &polygon, &clear)) {
+  PointMemory on[2];
+  block.get(lane, kLocalModelSize, 10, on);
+  SurfacePoint starts[2];
+  for (int k = 0; k < 2; ++k) starts[k] = {static_cast<int>(on[k].patch), on[k].u, on[k].v};
+  if (!find_polygon(a, b, normal, overlap, kReach * overlap, nullptr, &polygon, &clear, starts)) {
     block.until[lane] = way + clear;
     return false;
   }
