@@ -13,8 +13,9 @@ namespace nurbs {
 namespace {
 
 constexpr double kFaceCosine = 0.5;  // a face further than 60 degrees from the contact's normal is not asked
-constexpr double kLineAngle = 0.8;   // rad, the same for the normal of a ruled line
-constexpr double kThinnest = 1e-7;   // width to length of a polygon below which it is a segment
+constexpr double kOtherFaceCosine = 0.3;  // nor may one further than 72 degrees soon be
+constexpr double kLineAngle = 0.8;        // rad, the same for the normal of a ruled line
+constexpr double kThinnest = 1e-7;        // width to length of a polygon below which it is a segment
 constexpr double kInfinite = std::numeric_limits<double>::infinity();
 
 // Share of the room to a polygon, at most kMostRoom smaller bounding radii, that bodies may go: reach and
@@ -786,10 +787,18 @@ bool make_pair_polygon(const Particle& pa, const Particle& pb, const Vec3& norma
   if (line_contact(a, b, normal, overlap, reach, starts, out, &room)) return true;
   *out = {};
   if (!clear) return false;
-  for (const int reference : {0, 1})
-    if (room > 0)
-      room = std::min(
-          room, depth[reference] > most ? depth[reference] - most : contact(reference).room(reach - overlap));
+  // Other faces may become the nearest ones.
+  const auto keep_off = [&](const Body& owner, const Body& other, const Vec3& d) {
+    for (const FlatFace& face : owner.shape->flats.faces) {
+      if (!(room > 0)) return;
+      if (face.normal.dot(d) < kOtherFaceCosine) continue;
+      FaceContact contact(owner, face, other);
+      const double overlap_of = contact.depth(most);
+      room = std::min(room, overlap_of > most ? overlap_of - most : contact.room(reach - overlap));
+    }
+  };
+  keep_off(a, b, a.turned_back(normal));
+  keep_off(b, a, b.turned_back(-normal));
   const double smaller = std::min(a.radius(), b.radius()), larger = std::max(a.radius(), b.radius());
   *clear = kWayShare * std::min(room, kMostRoom * smaller) * smaller / larger;
   return false;
