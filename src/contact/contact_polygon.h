@@ -59,7 +59,9 @@ constexpr double kSlideShare = 1e-3;  // of the polygon's size that cut points m
 constexpr double kReferenceShare = 0.05;  // of the overlap by which the other face must be the shallower one
                                           // to become the reference
 constexpr double kOutgrownShare = 0.1;    // of the overlap by which the body may be deeper than its points
-constexpr double kClipSlack = 1e-9;       // of the larger bounding radius: places that count as equal
+constexpr double kClearTurn = 0.2;   // of the smaller bounding radius: what a contact's normal that turns
+                                     // by 1 rad takes off its clear way
+constexpr double kClipSlack = 1e-9;  // of the larger bounding radius: places that count as equal
 
 struct ContactPolygon {
   std::int32_t count;      // 0: none; 2: a segment; 3 to 8: in order around the polygon
@@ -94,8 +96,8 @@ BodyFrame plane_frame(const Vec3& origin);
 // 11 us for a rounded box: mostly one support search from a cold start.
 //
 // `clear`, of this and the others, is set where the answer is no: how far the bodies' points may go, paths of
-// both together, before it can be another one; 0 where that is not known. It holds for contacts whose normal
-// turns with the bodies, and whose overlap grows by no more than they go.
+// both together, before it can be another one; 0 where that is not known. It holds for contacts whose overlap
+// grows by no more than they go; of the normal's turns kClearTurn is to be taken off.
 bool make_plane_polygon(const Particle& particle, const Vec3& origin, const Vec3& normal, double reach,
                         ContactPolygon* out, double* clear = nullptr);
 

@@ -50,6 +50,7 @@ class Follower {
       const Vec3 x = pose_.apart + point;
       const double et = e.dot(t), es = e.dot(s);
       f = c.dot(x);
+      if (!(pose_.side * f > 0)) return false;  // the other side of the axis
       slope = e.dot(x);
       bend = m.w0 * et * et + 2 * m.w1 * et * es + m.w2 * es * es - f;
       if (!(-pose_.side * bend > 0)) return false;

@@ -6,7 +6,7 @@
 // Inside the cylinder they are maxima, c points outward and gap = radius - F; outside they are minima with F
 // < 0, c points at the axis and gap = -radius - F. c is the body's outward normal there, -c the contact's. A
 // body that is more curved than the tube (rho < radius) about c has no other maximum above the radius near:
-// see cylinder_search.cpp.
+// see tube_search.h.
 #pragma once
 
 #include "contact/contact.h"
@@ -40,8 +40,9 @@ PairMemory cylinder_memory(const Particle& particle, const SurfacePoint& where);
 
 // The stationary value next to the last one: by the body's local model there (50 ns), where its errors leave
 // the overlap and the normal as right as `settings` ask (pair_memory.h), else by Newton on the surface, for
-// the stationary distance from the axis (0.1 us an iteration). False where that leads nowhere: at poles,
-// creases, ruled lines and flats, on dents, after long ways. The memory then stays as it is.
+// the stationary distance from the axis (0.1 us an iteration), else, on creases and corners too, by Newton in
+// c over supports. False where that leads nowhere: on ruled lines and flats, on dents, after long ways. The
+// memory then stays as it is.
 bool follow_on_cylinder(const Particle& particle, const CylinderPose& pose, const ContactSettings& settings,
                         PairMemory* memory, CylinderContact* contact);
 

@@ -51,6 +51,11 @@ bool set_met(const PairFrame& pair, const Vec3& n, const PointPair& points, doub
   return true;
 }
 
+bool is_on(const Shape& shape, const FlatFace& face, const SurfacePoint& at) {
+  const Vec3 x = evaluate0(shape.patches[at.patch], at.u, at.v);
+  return std::abs(face.normal.dot(x) - face.offset) <= kFlatness * shape.bounding_radius;
+}
+
 // Owner: whose face it is, 0 for A.
 bool meet_face(const PairFrame& pair, const Vec3& direction, int owner, double tolerance, JointSolution* s) {
   const bool of_a = owner == 0;
@@ -78,7 +83,10 @@ bool meet_face(const PairFrame& pair, const Vec3& direction, int owner, double t
   PointPair points;
   points.a = of_a ? x : y;
   points.b = of_a ? y : x;
-  const SurfacePoint on_face{face.patch, 0.5, 0.5};
+  // Where on the face matters to none; another search that begins there likes it near.
+  const SurfacePoint& last = of_a ? s->points.on_a : s->points.on_b;
+  const bool stays = last.patch >= 0 && is_on(flat, face, last);
+  const SurfacePoint on_face = stays ? last : SurfacePoint{face.patch, 0.5, 0.5};
   points.on_a = of_a ? on_face : top.where;
   points.on_b = of_a ? top.where : on_face;
   return set_met(pair, n, points, other_scale * (top.upper - top.h), scale * face.slack, tolerance, s);

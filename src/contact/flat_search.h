@@ -9,8 +9,8 @@ namespace nurbs {
 
 // The contact along the normal of the face of either body that is nearest to `direction` (unit, pair frame),
 // or along the common normal of the creases that lie furthest that way. True: *s is converged, its bracket no
-// wider than `tolerance` (a length); else *s stays. One hull support for a face, two for creases, started at
-// s->points.
+// wider than `tolerance` (a length); else *s stays. One hull support for each face that is tried, two for
+// creases, started at s->points.
 //
 // Proof. Let p(d) = h_A(d) + h_B(-d) - d . offset be `overlap` along the unit n, and A - B, moved so that
 // the offset is the origin, hold the disc of radius m square to n about overlap n: because A's face does,

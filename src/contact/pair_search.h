@@ -12,7 +12,8 @@ constexpr int kPairMemorySize = 54;
 // Gap, normal and contact points of two particles. The rungs, each a function of pair_search.cpp: the budget
 // of the last proof and the bounding spheres (7 ns); spheres and ellipsoids in closed form (20 and 170 ns;
 // sphere_search.h, ellipsoid_search.h); the direction atlases (80 ns); the local model (65 ns);
-// Newton from the last contact (0.25 us, 2 us next to a dent, 10 us over it); a cold start (2 us); the
+// Newton from the last contact (0.25 us, 2 us next to a dent, 10 us over it), where that is on a face or two
+// creases along their known direction (1 us; flat_search.h); a cold start (2 us); the
 // search over directions of deep pairs (10 us); the polytope (70 us and more). A pair that touched last time
 // begins at the local model. Neither throws nor allocates, but for a shape's inner map at its first deep
 // overlap; always returns a bracket.
@@ -28,7 +29,7 @@ constexpr int kPairMemorySize = 54;
 // rad, the overlap to about t times itself, or t times kForceDepth of the radius where it is shallower, hence
 // a force kn overlap or kn overlap^1.5 along the normal to about t of its size. Newton's last update squares
 // an angle of at most sqrt(t); the local model serves while what it left out says so. Not held to it:
-// contacts that only the polytope resolves, on flats, kinks and in deep overlap, and those next to a pole,
+// contacts that only the polytope resolves, on kinks and in deep overlap, and those next to a pole,
 // where normals are right to about sqrt(t).
 //
 // Deterministic: the result depends only on the arguments, and callers pass the particles in tag order.

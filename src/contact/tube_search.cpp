@@ -228,6 +228,8 @@ class TubeSearch {
     for (int k = 0; k < former_count; ++k) {
       Known& next = known_[k];
       if (!follow(*former[k].memory, &next)) return false;
+      for (int j = 0; j < k; ++j)  // two that have become one
+        if (std::abs(std::remainder(next.angle - known_[j].angle, 2 * M_PI)) < kFinestRing) return false;
       TubeSurvey::Arc* arc = arc_of(survey, next);
       if (arc == nullptr && open) {
         ++elsewhere;
@@ -361,7 +363,7 @@ class TubeSearch {
   int choose_angles(double reach, double* angles) const {
     int count = 0;
     const auto put = [&](double angle) {
-      if (std::abs(angle) < reach && count < kMostAngles - 1) angles[count++] = angle;
+      if (std::abs(angle) < reach && count < kMostAngles - 2) angles[count++] = angle;
     };
     const int parts = static_cast<int>(std::ceil(2 * reach / kCoarsestRing));
     for (int k = 1; k < parts; ++k) {
@@ -555,9 +557,10 @@ double find_in_tube(const Particle& particle, const CylinderPose& pose, const Co
   if (search.is_single()) {
     Known next;
     for (int k = 0; k < former_count; ++k) {
-      if (!search.follow(*former[k].memory, &next)) continue;
-      search.add(next);
       const double flattest = particle.scale * particle.shape->patch_curvature.max_radius;
+      if (!search.follow(*former[k].memory, &next)) continue;
+      if (!(pose.radius - next.contact.gap > flattest)) continue;  // lower, another maximum may be above it
+      search.add(next);
       return std::min(next.contact.gap - kSameMaximum * pose.radius, pose.radius - flattest);
     }
     return search.find_one();

@@ -114,7 +114,10 @@ bool ContactStages::make_flat(ContactBlock& block, int lane, const Results& sing
   double before[3];
   block.get(lane, kStateField + 3, 3, before);
   const double way = path(a, b);
-  if (way < block.until[lane] && normal.dot(load(before)) > kSameNormal) return false;
+  block.until[lane] -= kClearTurn * smaller_radius(a, b) * (normal - load(before)).norm();
+  // A region's plane may be another one than the last step's.
+  if (a >= -1 && way < block.until[lane] && normal.dot(load(before)) > kSameNormal) return false;
+  block.until[lane] = 0;
   const double overlap = -single.gap[lane];
   ContactPolygon polygon;
   double clear = 0;
@@ -186,7 +189,8 @@ bool ContactStages::serve_flat(ContactBlock& block, int lane, LeftPolygon* left)
         stays = remake(block, lane, flat, state, overlap);
         until = way;
       } else {
-        until = way + still_holds(state, deepest, record(a).radius, record(b).radius);
+        const double radius = record(b).radius;
+        if (a >= -1) until = way + still_holds(state, deepest, a < 0 ? radius : record(a).radius, radius);
       }
     }
     if (!stays) {

@@ -689,10 +689,12 @@ void print_cost(const Shape& shape) {
       "kind               %s\n",
       shape.proofs.sphere     ? "sphere: contacts take the closed form"
       : shape.ellipsoid.found ? "ellipsoid: contacts take the closed form"
-      : !shape.smooth         ? "creased: contacts on creases take the polytope method"
+      : !shape.smooth
+          ? "creased: contacts along faces and creases are followed, new ones take the polytope method"
       : shape.concavity > kUnmentionedDent * shape.bounding_radius ? "dented: bridged by the convex hull"
-      : std::isinf(shape.patch_curvature.max_radius)               ? "smooth with flats"
-                                                     : "smooth, strictly convex: the fast path throughout");
+      : std::isinf(shape.patch_curvature.max_radius)
+          ? "smooth with flats: faces that lie on each other touch at up to eight points"
+          : "smooth, strictly convex: the fast path throughout");
 }
 
 void print_form(const Shape& shape) {

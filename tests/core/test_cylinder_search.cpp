@@ -337,4 +337,31 @@ TEST(CylinderSearch, contacts_of_bodies_with_flats_are_followed) {
   EXPECT_GT(kept, 0.3 * steps);
 }
 
+// A prism pressed into a tube hardly wider touches along a dozen edges, all of them followed.
+TEST(CylinderSearch, many_contacts_are_followed) {
+  Random random(11);
+  int most = 0;
+  for (int n = 0; n < 12; ++n) {
+    const int sides = 6 + n % 7;
+    const ShapePointer shape = make_shape("prism", prism(sides, 1, 0.5));
+    Particle p;
+    p.shape = shape.get();
+    const Vec3 axis = Vec3::UnitZ(), origin = random.box(-1, 1);
+    const double radius = 1 - random.log_uniform(1e-4, 1e-3);
+    Follower follower;
+    for (int k = 0; k < 30; ++k) {
+      p.x = origin + random.log_uniform(1e-9, 2e-5) * random.direction();
+      p.q = (Quat(Eigen::AngleAxisd(random.log_uniform(1e-9, 1e-4), random.direction())) * p.q).normalized();
+      SCOPED_TRACE(std::to_string(sides) + " sides, step " + std::to_string(k));
+      SurfaceContacts found, reference;
+      follower.find(p, origin, axis, radius, &found);
+      find_cylinder_contacts(p, origin, axis, radius, {}, 5, nullptr, 0, nullptr, &reference);
+      EXPECT_EQ(found.count, reference.count);
+      for (int i = 0; i < std::min(found.count, reference.count); ++i) EXPECT_LT(found.contact[i].gap, 0);
+      most = std::max(most, found.count);
+    }
+  }
+  EXPECT_GE(most, 8);
+}
+
 }  // namespace
