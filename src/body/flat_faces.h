@@ -64,7 +64,7 @@ FlatFeatures find_flat_features(const Shape& shape);
 int nearest_face(const FlatFeatures& features, const Vec3& d, double cosine);
 
 // The straight line of constant normal through a surface point, across patches as long as it goes straight
-// on. The patches beside a joint that it lies on are tried too, and those whose lines end at its own patch.
+// on. `at` may lie on a joint: then the patches beside it are tried too.
 // False where there is none, or none whose normal is within `angle` (rad) of d.
 struct RuledLine {
   Vec3 ends[2];

@@ -72,17 +72,18 @@ void set_point(SupportSet& set, int i, const Vec3& point, int vertex) {
   set.vertex[i] = vertex;
 }
 
-// The end of a neighbour's rulings that lies next to a surface point: rounded edges have their support beside
-// the lines that they end.
-bool beside_ruling(const Shape& shape, const EdgeLink& link) {
+// Whether a neighbour's rulings end at the joint.
+bool ends_ruling(const Shape& shape, const EdgeLink& link) {
   const Ruling ruling = shape.flats.ruling[link.patch];
   return ruling != Ruling::none &&
          (link.edge == end_edge(ruling, false) || link.edge == end_edge(ruling, true));
 }
 
-}  // namespace
-
-bool ruled_line(const Shape& shape, const SurfacePoint& at, const Vec3& d, double angle, RuledLine* line) {
+// Of the lines of constant normal through a surface point, or through its neighbours over a joint that it
+// lies on, the one whose lower end is highest along d. `beside`: also those that end at its own patch,
+// wherever on it the point is.
+bool best_line(const Shape& shape, const SurfacePoint& at, const Vec3& d, double angle, bool beside,
+               RuledLine* line) {
   if (shape.flats.ruling.empty()) return false;
   double best = -std::numeric_limits<double>::infinity();
   const auto try_at = [&](const SurfacePoint& place) {
@@ -95,12 +96,19 @@ bool ruled_line(const Shape& shape, const SurfacePoint& at, const Vec3& d, doubl
   for (int edge = 0; edge < 4; ++edge) {
     const double off = edge == 0 ? at.u : edge == 1 ? 1 - at.u : edge == 2 ? at.v : 1 - at.v;
     const EdgeLink& link = shape.links[at.patch][edge];
-    if (link.patch < 0 || link.collapsed || (off > kBesideJoint && !beside_ruling(shape, link))) continue;
+    if (link.patch < 0 || link.collapsed) continue;
+    if (off > kBesideJoint && !(beside && ends_ruling(shape, link))) continue;
     SurfacePoint on_edge = at;
-    (edge < 2 ? on_edge.u : on_edge.v) = edge % 2;
+    if (beside) (edge < 2 ? on_edge.u : on_edge.v) = edge % 2;
     try_at(across(shape.patches, link, on_edge, edge));
   }
   return best > -std::numeric_limits<double>::infinity();
+}
+
+}  // namespace
+
+bool ruled_line(const Shape& shape, const SurfacePoint& at, const Vec3& d, double angle, RuledLine* line) {
+  return best_line(shape, at, d, angle, false, line);
 }
 
 SupportSet support_set(const Shape& shape, const Vec3& d, double tolerance) {
@@ -158,7 +166,7 @@ double feature_lag(const Shape& shape, const Vec3& d, const Support& support) {
     highest =
         std::max(highest, std::min(d.dot(flats.vertices[edge.ends[0]]), d.dot(flats.vertices[edge.ends[1]])));
   RuledLine line;
-  if (ruled_line(shape, support.where, d, M_PI / 4, &line))
+  if (best_line(shape, support.where, d, M_PI / 4, true, &line))
     highest = std::max(highest, std::min(d.dot(line.ends[0]), d.dot(line.ends[1])));
   return support.h - highest;
 }

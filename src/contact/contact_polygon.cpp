@@ -200,8 +200,13 @@ class FaceContact {
       least = std::min(least,
                        segment_room({incident_.vertex(edge.ends[0]), incident_.vertex(edge.ends[1])}, most));
     }
-    RuledLine line;
-    return least > 0 && incident_line(&line) ? std::min(least, segment_room(line.ends, most)) : least;
+    const Shape& shape = *incident_.shape;
+    if (!(least > 0) || shape.flats.ruling.empty()) return least;
+    const Vec3 d = incident_.turned_back(-plane_.normal);  // lines lag behind the deepest point
+    const Support deepest = find_hull_support(shape, d);
+    const double line = plane_.height(incident_.place(deepest.point)) +
+                        incident_.frame.scale * feature_lag(shape, d, deepest);
+    return std::clamp(line - most, 0.0, least);
   }
 
   // `swallowed`: the reference face lies inside the incident one.
