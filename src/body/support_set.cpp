@@ -5,7 +5,7 @@
 #include <limits>
 
 #include "body/connectivity.h"
-#include "body/flat_faces.h"
+#include "body/ruled_lines.h"
 #include "body/shape.h"
 #include "body/support.h"
 
@@ -109,6 +109,11 @@ bool best_line(const Shape& shape, const SurfacePoint& at, const Vec3& d, double
 
 bool ruled_line(const Shape& shape, const SurfacePoint& at, const Vec3& d, double angle, RuledLine* line) {
   return best_line(shape, at, d, angle, false, line);
+}
+
+bool ruled_line_near(const Shape& shape, const SurfacePoint& at, const Vec3& d, double angle,
+                     RuledLine* line) {
+  return best_line(shape, at, d, angle, true, line);
 }
 
 SupportSet support_set(const Shape& shape, const Vec3& d, double tolerance) {

@@ -7,6 +7,7 @@
 #include <limits>
 
 #include "body/flat_faces.h"
+#include "body/ruled_lines.h"
 #include "body/support.h"
 
 namespace nurbs {
@@ -202,11 +203,10 @@ class FaceContact {
     }
     const Shape& shape = *incident_.shape;
     if (!(least > 0) || shape.flats.ruling.empty()) return least;
-    const Vec3 d = incident_.turned_back(-plane_.normal);  // lines lag behind the deepest point
-    const Support deepest = find_hull_support(shape, d);
-    const double line = plane_.height(incident_.place(deepest.point)) +
-                        incident_.frame.scale * feature_lag(shape, d, deepest);
-    return std::clamp(line - most, 0.0, least);
+    const Vec3 d = incident_.turned_back(-plane_.normal);
+    RuledLine line;
+    const bool any = ruled_line_near(shape, find_hull_support(shape, d).where, d, kLineAngle, &line);
+    return any ? std::min(least, segment_room(line.ends, most)) : least;
   }
 
   // `swallowed`: the reference face lies inside the incident one.
