@@ -132,6 +132,7 @@ void set_marks(const BodyFrame& reference, const BodyFrame& incident, ContactPol
     return reference.axes.transpose() * (x - reference.x);
   };
   const Vec3 zero = in_reference(0);
+  store(-(incident.axes.transpose() * (reference.axes * load(out->normal))), out->down);
   double most = 0;
   out->far = 0;
   for (int i = 1; i < out->count; ++i) {
@@ -631,8 +632,9 @@ class RegionClip {
   // Distance of points from the region's border.
   double room(const ConvexPolygon& points) const {
     double least = kInfinite;
-    for (std::size_t k = 0; k + 1 < region_.border.size(); k += 2) {
-      const Vec2 a = project(region_.border[k]), way = project(region_.border[k + 1]) - a;
+    const std::vector<Vec3>& border = region_.cells->border;
+    for (std::size_t k = 0; k + 1 < border.size(); k += 2) {
+      const Vec2 a = project(border[k]), way = project(border[k + 1]) - a;
       for (int i = 0; i < points.count; ++i) {
         const Vec2 x = points.corner[i] - a;
         const double t = std::clamp(x.dot(way) / way.squaredNorm(), 0.0, 1.0);
@@ -646,10 +648,10 @@ class RegionClip {
   template <class Visit>
   void each_cell(Visit visit) const {
     int first = 0;
-    for (const int end : region_.ends) {
+    for (const int end : region_.cells->ends) {
       ConvexPolygon cell;
       for (int k = first; k < end && cell.count < kOutlinePoints; ++k)
-        cell.add(project(region_.corners[k]), 0, 0);
+        cell.add(project(region_.cells->corners[k]), 0, 0);
       if (polygon_area(cell) < 0) std::reverse(cell.corner, cell.corner + cell.count);
       visit(cell);
       first = end;
@@ -710,7 +712,7 @@ RegionContact make_region_polygon(const Particle& particle, const PlaneRegion& r
     if (!make_plane_polygon(particle, region.origin, region.normal, reach, out)) return RegionContact::point;
     return placed(room);
   };
-  if (region.unbounded) return whole(kInfinite);
+  if (!region.cells) return whole(kInfinite);
   const RegionClip clip(region, body.scale * shape.bounding_radius);
   Candidates points;
   double size = 0;
@@ -876,7 +878,10 @@ PolygonState evaluate(const ContactPolygon& polygon, const BodyFrame& a, const B
     (a_is_reference ? state.arm_a : state.arm_b)[i] = middle + apart;
   }
   state.energy = 0.5 * energy;
-  if (polygon.count > 0 && polygon.room < kInfinite) {
+  if (polygon.rolling != 0)
+    state.rolled =
+        (outward_on_incident + incident.scale * load(polygon.down)).norm() * incident.shape->bounding_radius;
+  if (polygon.count > 0 && (polygon.rolling != 0 || polygon.room < kInfinite)) {
     const auto lateral = [&](int i, const double* mark) {
       const Vec3 x =
           apart + incident.scale * (incident.axes * load(polygon.point[i])) - reference.axes * load(mark);
@@ -889,7 +894,9 @@ PolygonState evaluate(const ContactPolygon& polygon, const BodyFrame& a, const B
 
 PolygonVerdict judge(const ContactPolygon& polygon, const PolygonState& state) {
   if (!(state.least < 0)) return PolygonVerdict::open;
-  if (polygon.rolling != 0 || state.slid > polygon.room) return PolygonVerdict::moved;
+  if (state.slid > polygon.room) return PolygonVerdict::moved;
+  if (polygon.rolling != 0 && state.slid + state.rolled > -kRollShare * state.least)
+    return PolygonVerdict::moved;
   return state.most > 0 || polygon.count == 2 ? PolygonVerdict::tilted : PolygonVerdict::keep;
 }
 

@@ -243,6 +243,7 @@ void MeshPatch::link_vertices() {
 
 // What follows from the places of the vertices.
 void MeshPatch::place() {
+  forget_cells();
   for (Edge& e : edges_) {
     const Vec3 way = vertices_[e.v[1]].x - vertices_[e.v[0]].x;
     e.length = way.norm();
@@ -306,6 +307,33 @@ void MeshPatch::list_outlines() {
     p.edges = unique(edges_in_, p.first_edge);
     p.vertices = unique(vertices_in_, p.first_vertex);
   }
+}
+
+void MeshPatch::forget_cells() {
+  outlines_.resize(std::max(outlines_.size(), planes_.size()));
+  for (PlaneCells& cells : outlines_) {
+    cells.corners.clear();
+    cells.ends.clear();
+    cells.border.clear();
+  }
+}
+
+const PlaneCells& MeshPatch::cells_of(int number) {
+  PlaneCells& out = outlines_[number];
+  if (!out.ends.empty()) return out;
+  const Plane& plane = planes_[number];
+  for (int i = plane.first; i < plane.first + plane.cells; ++i) {
+    const Cell& cell = cells_[cells_in_[i]];
+    for (int k = 0; k < cell.corners; ++k) {
+      const Vec3& x = vertices_[corners_[cell.first + k]].x;
+      out.corners.push_back(x);
+      if (edges_[edge_of_[cell.first + k]].inner) continue;
+      out.border.push_back(x);
+      out.border.push_back(vertices_[corners_[cell.first + (k + 1) % cell.corners]].x);
+    }
+    out.ends.push_back(static_cast<int>(out.corners.size()));
+  }
+  return out;
 }
 
 std::size_t MeshPatch::bytes() const {

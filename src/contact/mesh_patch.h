@@ -9,7 +9,7 @@
 #include <utility>
 #include <vector>
 
-#include "nurbs/types.h"
+#include "contact/plane_region.h"
 
 namespace nurbs {
 
@@ -48,6 +48,9 @@ class MeshPatch {
     int first_edge, edges;       // that are not inner, in edge_in()
     int first_vertex, vertices;  // likewise, in vertex_in()
     int hint;                    // cell that had a point last
+    // Of the caller: a path up to which the body meets the plane, then with this normal, at a point.
+    double pointed = -1e300;
+    Vec3 pointed_normal = Vec3::Zero();
   };
 
   // From triangles in an order that does not depend on ranks; corners closer than `weld` (length) are one.
@@ -74,6 +77,8 @@ class MeshPatch {
   double sign_of(int i) const { return signs_[i]; }  // of the cell of corner i about its side from there
   int corner(int i) const { return corners_[i]; }
   int edge_of(int i) const { return edge_of_[i]; }
+  // What of a plane is wall; stays until the triangles move.
+  const PlaneCells& cells_of(int plane);
   std::size_t bytes() const;
 
  private:
@@ -88,6 +93,7 @@ class MeshPatch {
   void place();
   void classify();
   void list_outlines();
+  void forget_cells();
 
   std::vector<Vertex> vertices_;
   std::vector<Edge> edges_;
@@ -98,6 +104,7 @@ class MeshPatch {
   std::vector<double> signs_;
   std::vector<Key> keys_;
   std::vector<std::pair<double, int>> by_x_;
+  std::vector<PlaneCells> outlines_;  // by plane; empty until asked for
   bool unbounded_ = false;
 };
 

@@ -20,6 +20,7 @@ constexpr double kSameNormal = 0.9;      // cosine: a former contact this near h
 struct ActivePlane {
   bool active = false;
   bool claimed = false;  // by a flat feature
+  bool stands = false;   // its polygon of the last step bears all over
   Vec3 normal;           // towards the body
   Vec3 deepest;          // the body's point, relative to its centre
   ContactResult result;
@@ -36,7 +37,6 @@ struct Workspace {
   std::vector<ActivePlane> planes;
   std::vector<MetEdge> edges;
   std::vector<int> active;
-  PlaneRegion region;
 };
 Workspace& workspace() {
   static thread_local Workspace w;
@@ -115,12 +115,8 @@ class SurfaceSearch {
     return point;
   }
 
-  // Whether a polygon over the region overlaps it, and its deepest point.
-  bool polygon_over(const PlaneRegion& region, double reach, double* gap, Vec3* on_body) const {
-    ContactPolygon polygon;
-    if (make_region_polygon(particle_, region, particle_.x, reach, &polygon) != RegionContact::polygon)
-      return false;
-    const PolygonState state = evaluate(polygon, plane_frame(particle_.x), body_frame(particle_));
+  // The deepest point of a polygon that overlaps the plane.
+  static bool deepest_point(const PolygonState& state, double* gap, Vec3* on_body) {
     *gap = 0;
     for (int k = 0; k < state.count; ++k)
       if (state.gap[k] < *gap) {
@@ -130,9 +126,47 @@ class SurfaceSearch {
     return *gap < 0;
   }
 
+  // Whether a polygon over the region overlaps it, and its deepest point.
+  bool polygon_over(const PlaneRegion& region, double reach, double* gap, Vec3* on_body,
+                    double* clear = nullptr) const {
+    ContactPolygon polygon;
+    if (make_region_polygon(particle_, region, particle_.x, reach, &polygon, clear) != RegionContact::polygon)
+      return false;
+    const PolygonState state = evaluate(polygon, plane_frame(particle_.x), body_frame(particle_));
+    return deepest_point(state, gap, on_body);
+  }
+
+  // Whether a polygon of the last step stands on the plane and has the body's deepest point, so that no search
+  // is needed: with all the points of a face, or as long as it is known to.
+  bool stands_on(const MeshPatch::Plane& plane, ActivePlane* met) const {
+    for (int k = 0; k < former_count_; ++k) {
+      const FormerContact& f = former_[k];
+      if (!f.polygon || !(f.normal.dot(met->normal) > kSamePlane)) continue;
+      ContactPolygon polygon = *f.polygon;
+      for (int i = 0; i < 3; ++i) polygon.normal[i] = met->normal[i];
+      polygon.offset = met->normal.dot(plane.origin - f.frame);  // it may have moved, or stand back
+      const PolygonState state = evaluate(polygon, plane_frame(f.frame), body_frame(particle_));
+      const PolygonVerdict verdict = judge(polygon, state);
+      if (verdict != PolygonVerdict::keep && !(verdict == PolygonVerdict::tilted && path_ < f.until)) continue;
+      if (std::abs(polygon.offset - f.polygon->offset) > -state.least) continue;  // another plane
+      met->result = ContactResult{};
+      met->result.status = Status::converged;
+      met->result.rung = Rung::local_model;
+      met->memory = *f.memory;
+      met->memory.proof.contact = 1;
+      return deepest_point(state, &met->result.gap, &met->deepest);
+    }
+    return false;
+  }
+
   // Whether a flat feature of the body stands on the plane, over a part of it that is wall.
   bool stand_on(int number) {
     const ActivePlane& met = planes_[number];
+    if (met.stands) {
+      add_plane(number, patch_.unbounded() ? 0 : patch_.planes()[number].leader, true, met.result.gap,
+                met.deepest);
+      return true;
+    }
     bool stands = false;
     for (int k = 0; k < former_count_ && !stands; ++k)
       stands = former_[k].flat && former_[k].normal.dot(met.normal) > kSamePlane;
@@ -145,12 +179,18 @@ class SurfaceSearch {
         if (other != number && planes_[other].normal.dot(met.normal) > kOneSlope) return false;
     }
     if (!stands || !over) {
-      PlaneRegion& region = workspace().region;
-      plane_region(patch_, number, particle_.x, &region);
+      MeshPatch::Plane& plane = patch_.planes()[number];
+      if (!stands && path_ + kClearTurn * radius_ * (met.normal - plane.pointed_normal).norm() < plane.pointed)
+        return false;
+      const PlaneRegion region = plane_region(patch_, number, particle_.x);
       const double reach = stands ? kKeptReach : kReach;
-      double gap = 0;
+      double gap = 0, clear = 0;
       Vec3 on_body = Vec3::Zero();
-      if (!polygon_over(region, -reach * met.result.gap, &gap, &on_body)) return false;
+      if (!polygon_over(region, -reach * met.result.gap, &gap, &on_body, &clear)) {
+        plane.pointed = stands ? -kFarAway : path_ + clear;
+        plane.pointed_normal = met.normal;
+        return false;
+      }
       if (!over) {  // the plane's deepest point is beside the wall; the polygon's is on it
         if (!polygon_over(region, -reach * gap, &gap, &on_body)) return false;
         add_plane(number, triangle, true, gap, on_body);
@@ -208,7 +248,7 @@ class SurfaceSearch {
   bool look_at_plane(int number) {
     MeshPatch::Plane& plane = patch_.planes()[number];
     ActivePlane& met = planes_[number];
-    met.active = false;
+    met.active = met.stands = false;
     if (path_ < plane.expiry) return false;
     const double height = plane.normal.dot(particle_.x - plane.origin);
     if (std::abs(height) > radius_) {
@@ -216,6 +256,7 @@ class SurfaceSearch {
       return false;
     }
     met.normal = height < 0 ? Vec3(-plane.normal) : plane.normal;
+    if (stands_on(plane, &met)) return met.active = met.stands = true;
     // A corner that came under a cell from beside it need not meet the cell itself, but stays its contact.
     if (plane.cells > 0 && plane.cells <= kFewCells && !(edged(*particle_.shape) && stood_on(met.normal))) {
       const double clear = clearance(plane);
@@ -534,25 +575,11 @@ class SurfaceSearch {
 
 }  // namespace
 
-void plane_region(const MeshPatch& patch, int number, const Vec3& body, PlaneRegion* region) {
+PlaneRegion plane_region(MeshPatch& patch, int number, const Vec3& body) {
   const MeshPatch::Plane& plane = patch.planes()[number];
-  region->origin = plane.origin;
-  region->normal = plane.normal.dot(body - plane.origin) < 0 ? Vec3(-plane.normal) : plane.normal;
-  region->unbounded = patch.unbounded();
-  region->corners.clear();
-  region->ends.clear();
-  region->border.clear();
-  for (int i = 0; i < plane.cells; ++i) {
-    const MeshPatch::Cell& cell = patch.cells()[patch.cell_in(plane.first + i)];
-    for (int k = 0; k < cell.corners; ++k) {
-      const Vec3& x = patch.vertices()[patch.corner(cell.first + k)].x;
-      region->corners.push_back(x);
-      if (patch.edges()[patch.edge_of(cell.first + k)].inner) continue;
-      region->border.push_back(x);
-      region->border.push_back(patch.vertices()[patch.corner(cell.first + (k + 1) % cell.corners)].x);
-    }
-    region->ends.push_back(static_cast<int>(region->corners.size()));
-  }
+  const bool below = plane.normal.dot(body - plane.origin) < 0;
+  return {plane.origin, below ? Vec3(-plane.normal) : plane.normal,
+          patch.unbounded() ? nullptr : &patch.cells_of(number)};
 }
 
 void SurfaceContacts::add(const SurfaceContact& c) {
@@ -582,6 +609,29 @@ SurfaceContact surface_contact(const FeatureContact& f, int triangle) {
 void find_surface_contacts(const Particle& particle, MeshPatch& patch, const ContactSettings& settings,
                            double path, const FormerContact* former, int former_count, SurfaceContacts* out) {
   SurfaceSearch(particle, patch, settings, path, former, former_count, out).run();
+}
+
+double one_face_until(const Particle& particle, const MeshPatch& patch, double path,
+                      const SurfaceContacts& found) {
+  if (found.count != 1) return -kFarAway;
+  const SurfaceContact& c = found.contact[0];
+  if (c.piece != SurfaceContact::face || c.flat || c.plane < 0) return -kFarAway;
+  double until = kFarAway;
+  for (std::size_t p = 0; p < patch.planes().size(); ++p)
+    if (static_cast<int>(p) != c.plane) until = std::min(until, patch.planes()[p].expiry);
+  const MeshPatch::Plane& plane = patch.planes()[c.plane];
+  if (!particle.shape->flats.empty()) {  // that it meets the plane at a point was asked in another pose
+    if (c.normal != plane.pointed_normal) return -kFarAway;
+    until = std::min(until, plane.pointed);
+  }
+  const double radius = particle.scale * particle.shape->bounding_radius;
+  for (int i = plane.first_edge; i < plane.first_edge + plane.edges && until > path; ++i) {
+    const MeshPatch::Edge& e = patch.edges()[patch.edge_in(i)];
+    const Vec3 apart = particle.x - patch.vertices()[e.v[0]].x;
+    const double along = std::clamp(apart.dot(e.direction), 0.0, e.length);
+    until = std::min(until, path + (1 - 1e-12) * (apart - along * e.direction).norm() - radius);
+  }
+  return until;
 }
 
 }  // namespace nurbs

@@ -48,7 +48,10 @@ struct SurfaceContact {
 struct FormerContact {
   Vec3 normal;
   const PairMemory* memory;
-  bool flat;  // has a polygon
+  bool flat;                                // has a polygon ...
+  const ContactPolygon* polygon = nullptr;  // ... this one, if it is known, ...
+  Vec3 frame = Vec3::Zero();                // ... with arms from this fixed point of the wall, ...
+  double until = -kFarAway;                 // ... beside which the body touches nowhere before this path
 };
 
 constexpr int kSurfaceContacts = 32;
@@ -70,8 +73,8 @@ inline bool edged(const Shape& shape) {
   return !shape.smooth || !shape.flats.empty();
 }
 
-// The region that a plane of the patch is.
-void plane_region(const MeshPatch& patch, int plane, const Vec3& body, PlaneRegion* region);
+// The region that a plane of the patch is, until the patch changes.
+PlaneRegion plane_region(MeshPatch& patch, int plane, const Vec3& body);
 
 // A body whose flat face, crease or ruled line stands on a plane has one contact with all of that plane, and
 // none with its edges: contact_polygon.h has the points. Where a body is sharper than its overlap is deep,
@@ -82,5 +85,10 @@ void plane_region(const MeshPatch& patch, int plane, const Vec3& body, PlaneRegi
 // looked at before it has gone far enough. `former`: contacts of the last step, whose memory is gone on from.
 void find_surface_contacts(const Particle& particle, MeshPatch& patch, const ContactSettings& settings,
                            double path, const FormerContact* former, int former_count, SurfaceContacts* out);
+
+// The path up to which a body that has one contact, at a point of a plane's face, has no other and that one on
+// the same face, however it moves: all of the plane that it can reach is wall, and other planes are out of its
+// reach. For walls that stand still; not above `path` where that is not known.
+double one_face_until(const Particle& particle, const MeshPatch& patch, double path, const SurfaceContacts& found);
 
 }  // namespace nurbs

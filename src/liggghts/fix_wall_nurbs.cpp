@@ -223,6 +223,9 @@ void FixWallNurbs::init() {
                std::string("Fix wall/nurbs ") + id + ": its fix mesh/surface " + mesh.id +
                    " is gone; unfix the wall first");
   }
+  surface_.count_by_triangle(std::any_of(meshes_.begin(), meshes_.end(), [](const Mesh& mesh) {
+    return mesh.fix->get_module("stress") != nullptr;
+  }));
   if (!meshes_.empty() && neighbor->style != 1)
     fail_all(FLERR, lmp, "Fix wall/nurbs mesh needs neighbor SKIN bin");
   ledger_ = nurbs_host::wants_ledger(lmp);

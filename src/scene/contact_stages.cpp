@@ -276,9 +276,9 @@ void ContactStages::look(int k) {
 ContactResult ContactStages::search(int a, int b, PairMemory& memory) {
   const Particle body = step_.bodies->particle(b);
   if (a < 0) {
-    ContactResult r = solve_plane_contact(body, step_.wall_normal.dot(offset(a, b)), step_.wall_normal,
-                                          step_.settings, memory);
-    const Vec3 apart = offset(a, b);  // its points are relative to the body
+    const Vec3 apart = offset(a, b), normal = wall_normal(a);
+    ContactResult r = solve_plane_contact(body, normal.dot(apart), normal, step_.settings, memory);
+    // Its points are relative to the body.
     r.point_a += apart;
     r.point_b += apart;
     return r;
@@ -503,6 +503,7 @@ void ContactStages::compute_block(ContactBlock& block) {
       continue;
     }
     close(block, lane);
+    if (a < -1) continue;  // a listed contact is kept as long as the caller finds it
     if (!(results.lower[lane] > 0) || stays_near(a, b, results.lower[lane], kStepsToPart)) continue;
     if (served) {
       PairProof& proof = *block.proof[lane];

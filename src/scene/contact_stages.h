@@ -15,6 +15,7 @@
 #include <vector>
 
 #include "contact/effective_radius.h"
+#include "contact/surface_search.h"
 #include "laws/energy_ledger.h"
 #include "scene/contact_pool.h"
 
@@ -65,6 +66,7 @@ struct WallContact {
   double weight = 1;     // +1, or below 0: what other contacts count twice
   Vec3 velocity = Vec3::Zero(), spin = Vec3::Zero();  // of the wall at point_a; lab
   int mark = 0;                                       // the caller's
+  bool face = false;  // at a point of a plane that stands still: a contact that goes on there follows by itself
   PlaneRegion* region = nullptr;  // that a flat feature of the body stands on, until the end of the step
   std::uint64_t name = 0;         // of the piece of the wall
   double path = 0;                // of the body and the wall together, as Bodies::path
@@ -135,9 +137,13 @@ class ContactStages {
   // at finite overlap neither bring nor, if it can be helped, take energy (wall_energy.cpp); `found` is
   // changed accordingly.
   void give(int body, std::int32_t* head, WallContact* found, int count, bool balanced = false);
+  // In place of give, where the body's one contact still is the one with the face that the last give said: so
+  // long it needs no search. False where it has none such, or not any more.
+  bool stay(int body, std::int32_t head);
   void end_step(double neighbours);
-  // The memory of a body's contacts and their normals, where the next search goes on; how many.
-  int former(std::int32_t head, Vec3* normals, PairMemory* memories, bool* flat) const;
+  // A body's contacts of the last step, where the next search goes on, with room for their memories; how
+  // many. Polygons are there until the next call of give.
+  int former(std::int32_t head, FormerContact* contacts, PairMemory* memories) const;
   // After bodies were renumbered or have left: begin, a call per body with a list, end. Others are dropped.
   void begin_lists();
   void keep_list(int body, std::int32_t head);
@@ -210,6 +216,7 @@ class ContactStages {
   bool stays_near(int a, int b, double lower, double steps) const;
   void look(int k);
   ContactResult search(int a, int b, PairMemory& memory);
+  Vec3 wall_normal(int a) const { return a == -1 ? step_.wall_normal : load(partners_[-2 - a].normal); }
   void count(const ContactResult& result, int a, int b);
   void note_depth(int a, int b, double gap);
 
@@ -256,6 +263,8 @@ class ContactStages {
     double body[3] = {};                  // where the body was in the last step
     const PlaneRegion* region = nullptr;  // of this step
     double path = 0;                      // of wall and body
+    double normal[3] = {};                // of the face that the contact follows by itself, through record.x
+    bool follows = false;                 // it does
     // Of balanced contacts.
     std::uint64_t name = 0;  // of the piece of the wall
     double level = 0;        // normal . wall's point
@@ -275,6 +284,7 @@ class ContactStages {
   void inherit(std::int32_t number, int body, const Former* former, int formers, const WallContact& found);
   void count_listed(const WallContact& found, std::int32_t number, int body);
   void update_listed(std::int32_t number, int body, const WallContact& found, bool known);
+  bool may_follow(std::int32_t number, int body, const WallContact& found) const;
 
   // What contacts that take each other's place hold: wall_energy.cpp.
   struct Holding;

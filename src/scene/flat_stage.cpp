@@ -183,14 +183,16 @@ bool ContactStages::serve_flat(ContactBlock& block, int lane, LeftPolygon* left)
     bool stays = verdict != PolygonVerdict::open;
     double overlap = -state.least;
     if (stays) {
-      const double deepest = support_gap(flat.polygon, a < 0 ? nullptr : &first, body, wall_frame(a));
+      const double deepest = block.fresh[lane] != 0  // the caller has sought it
+                                 ? fresh_[block.fresh[lane] - 1].gap
+                                 : support_gap(flat.polygon, a < 0 ? nullptr : &first, body, wall_frame(a));
       if (verdict == PolygonVerdict::moved || outgrown(state, deepest)) {
         overlap = std::max(overlap, -deepest);
         stays = remake(block, lane, flat, state, overlap);
         until = way;
       } else {
         const double radius = record(b).radius;
-        if (a >= -1) until = way + still_holds(state, deepest, a < 0 ? radius : record(a).radius, radius);
+        until = way + still_holds(state, deepest, a < 0 ? radius : record(a).radius, radius);
       }
     }
     if (!stays) {

@@ -72,6 +72,7 @@ void SurfaceWall::begin_near(int bodies) {
   near_.clear();
   first_.assign(bodies + 1, 0);
   expiry_.assign(bodies, -kFarAway);
+  stay_.assign(bodies, -kFarAway);
   patch_of_.assign(bodies, -1);
   patches_used_ = 0;
   path_ = 0;
@@ -101,10 +102,13 @@ void SurfaceWall::end_near(const std::vector<TriangleArray>& meshes) {
 void SurfaceWall::find(const ContactStages::Step& step, const std::vector<TriangleArray>& meshes,
                        double moved, PairProof* heads, ContactStages* stages) {
   path_ += moved;
+  still_ = kind_ == Kind::mesh && path_ == 0 &&
+           std::all_of(meshes.begin(), meshes.end(), [](const TriangleArray& m) { return !m.velocity; });
   overflows_ = 0;
   regions_used_ = 0;
   if (step.bodies->reshaped()) {
     std::fill(expiry_.begin(), expiry_.end(), -kFarAway);
+    std::fill(stay_.begin(), stay_.end(), -kFarAway);
     std::fill(patch_of_.begin(), patch_of_.end(), -1);
     patches_used_ = 0;
   }
@@ -113,6 +117,7 @@ void SurfaceWall::find(const ContactStages::Step& step, const std::vector<Triang
     const bool near = first_[body] < first_[body + 1];
     std::int32_t* head = &heads[body].contact;
     if (*head == 0 && (!near || path[body] + path_ < expiry_[body])) continue;
+    if (still_ && path[body] < stay_[body] && stages->stay(body, *head)) continue;
     if (near)
       find_for(body, step, meshes, head, stages);
     else
@@ -124,8 +129,7 @@ void SurfaceWall::find_for(int body, const ContactStages::Step& step,
                            const std::vector<TriangleArray>& meshes, std::int32_t* head,
                            ContactStages* stages) {
   FormerContact former[ContactStages::kMostListed];
-  const int formers = stages->former(*head, former_normals_, former_memories_, former_flat_);
-  for (int k = 0; k < formers; ++k) former[k] = {former_normals_[k], former_memories_ + k, former_flat_[k]};
+  const int formers = stages->former(*head, former, former_memories_);
   const Particle particle = step.bodies->particle(body);
   if (!finite(particle)) return stages->give(body, head, nullptr, 0);
   if (kind_ == Kind::cylinder)
@@ -135,6 +139,12 @@ void SurfaceWall::find_for(int body, const ContactStages::Step& step,
   else
     find_in_mesh(body, step, meshes, former, formers);
   expiry_[body] = contacts_.expiry;
+  stay_[body] = -kFarAway;
+  if (still_ && !by_triangle_) {
+    const Patch& patch = *patches_[patch_of_[body]];
+    const double path = step.bodies->path()[body];
+    stay_[body] = std::min(patch.until, one_face_until(particle, patch.mesh, path, contacts_));
+  }
   overflows_ += contacts_.full;
   for (int k = 0; k < contacts_.count; ++k) {
     const SurfaceContact& c = contacts_.contact[k];
@@ -142,9 +152,10 @@ void SurfaceWall::find_for(int body, const ContactStages::Step& step,
     f.weight = c.weight;
     f.name = name_of(c, body, meshes);
     f.region = nullptr;
+    f.face = still_ && c.piece == SurfaceContact::face;
     if (c.flat) {
       if (regions_used_ == regions_.size()) regions_.emplace_back();
-      plane_region(patches_[patch_of_[body]]->mesh, c.plane, particle.x, &regions_[regions_used_]);
+      regions_[regions_used_] = plane_region(patches_[patch_of_[body]]->mesh, c.plane, particle.x);
       f.region = &regions_[regions_used_++];
     }
     f.path = step.bodies->path()[body] + path_;

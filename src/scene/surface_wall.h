@@ -30,6 +30,9 @@ class SurfaceWall {
   enum class Kind { mesh, plane, cylinder };
   explicit SurfaceWall(Kind kind = Kind::mesh) : kind_(kind) {}
 
+  // Whether it matters on which of a plane's triangles a contact is.
+  void count_by_triangle(bool matters) { by_triangle_ = matters; }
+
   // Pose of a plane (`axis` its normal) or of a cylinder (`axis` along it), and its motion.
   void place(const Vec3& origin, const Vec3& axis, double radius, const WallMotion& motion);
 
@@ -83,16 +86,16 @@ class SurfaceWall {
   std::vector<Near> near_;      // by body
   std::vector<int> first_;      // of each body in near_
   std::vector<double> expiry_;  // path up to which a body is clear of the wall
+  std::vector<double> stay_;    // path up to which a body's one contact needs no search
   std::vector<int> patch_of_;   // body to patch or survey, -1: not made
   std::vector<std::unique_ptr<Patch>> patches_;
   std::deque<TubeSurvey> surveys_;  // of a tube
   int patches_used_ = 0, bodies_near_ = 0, overflows_ = 0;
   double path_ = 0;  // of the wall since the last end_near
+  bool still_ = false, by_triangle_ = true;
   std::vector<Triangle> triangles_;
   SurfaceContacts contacts_;
   WallContact found_[kSurfaceContacts];
-  Vec3 former_normals_[ContactStages::kMostListed];
-  bool former_flat_[ContactStages::kMostListed] = {};
   std::deque<PlaneRegion> regions_;  // that flat features stand on, of this step: the first regions_used_
   std::size_t regions_used_ = 0;
   PairMemory former_memories_[ContactStages::kMostListed];

@@ -41,18 +41,24 @@ void ContactStages::drop_listed(std::int32_t number) {
   partner(number).next = 0;
 }
 
-int ContactStages::former(std::int32_t head, Vec3* normals, PairMemory* memories, bool* flat) const {
+int ContactStages::former(std::int32_t head, FormerContact* contacts, PairMemory* memories) const {
   int count = 0;
   for (; head != 0 && count < kMostListed; head = partner(head).next) {
     const ContactBlock& block = pool_.blocks()[(head - 1) / kBlock];
     const int lane = ContactPool::lane(head);
     double normal[3];
     block.get(lane, kStateField + 3, 3, normal);
-    normals[count] = load(normal);
-    const double polygon = block.field[kFlat][lane];
-    flat[count] = polygon != 0;
-    if (flat[count]) normals[count] = load(pool_.flats()[static_cast<int>(polygon) - 1].polygon.normal);
-    PairMemory& m = memories[count++];
+    PairMemory& m = memories[count];
+    FormerContact& c = contacts[count++];
+    c = {load(normal), &m, false};
+    if (const double number = block.field[kFlat][lane]) {
+      c.flat = true;
+      const FlatContact& points = pool_.flats()[static_cast<int>(number) - 1];
+      c.polygon = &points.polygon;
+      c.until = points.points.until[0];
+      c.normal = load(c.polygon->normal);
+      c.frame = load(partner(head).record.x);
+    }
     m.proof = partner(head).proof;
     block.get(lane, kLocalModelSize, 10, &m.on_a);
     block.get(lane, 0, kLocalModelSize, &m.model);
@@ -82,11 +88,35 @@ void ContactStages::update_listed(std::int32_t number, int body, const WallConta
     flat->polygon.offset = p.region->normal.dot(p.region->origin - x);  // it stands back already
   }
   if (found.weight < 0) block.field[kWeight][lane] = found.weight;
+  p.follows = known && may_follow(number, body, found);
+  if (p.follows) return store(found.result.normal, p.normal);
   ContactResult r = found.result;
   r.point_a -= x;
   r.point_b -= x;
   fresh_.push_back(r);
   block.fresh[lane] = static_cast<int>(fresh_.size());
+}
+
+// Whether a contact that goes on can be followed by itself, as a neighbour's: it is at a point of a plane that
+// stands still, passes through the contact's fixed point, and is the one its memory is of.
+bool ContactStages::may_follow(std::int32_t number, int body, const WallContact& found) const {
+  if (!found.face || found.weight < 0 || found.region != nullptr || step_.bodies->reshaped()) return false;
+  const Partner& p = partner(number);
+  const ContactBlock& block = pool_.blocks()[(number - 1) / kBlock];
+  const int lane = ContactPool::lane(number);
+  const double height = found.result.normal.dot(found.result.point_a - load(p.record.x));
+  return p.shift == 0 && p.proof.stamp == found.memory.proof.stamp && block.field[kFlat][lane] == 0 &&
+         std::abs(height) <= kRoundoff * (record(body).radius + load(p.record.x).norm());
+}
+
+bool ContactStages::stay(int body, std::int32_t head) {
+  if (head == 0 || step_.setup) return false;
+  Partner& p = partner(head);
+  const ContactBlock& block = pool_.block(head);
+  const int lane = ContactPool::lane(head);
+  if (!p.follows || p.next != 0 || block.field[kStateField][lane] == 0) return false;
+  store(load(step_.bodies->record(body).x), p.body);
+  return true;
 }
 
 // A contact of the last step on a body's list: where it was, in lab axes.
@@ -185,16 +215,18 @@ void ContactStages::give(int body, std::int32_t* head, WallContact* found, int c
   for (int k = 0; k < count; ++k) {
     const WallContact& f = found[k];
     const std::int32_t n = number[k];
-    if (!known[k] || !step_.setup) {
-      ContactBlock& block = pool_.block(n);
-      const int lane = ContactPool::lane(n);
-      partner(n).proof = f.memory.proof;
-      block.set(lane, 0, kLocalModelSize, &f.memory.model);
-      block.set(lane, kLocalModelSize, 10, &f.memory.on_a);
+    update_listed(n, body, f, known[k]);
+    if (!partner(n).follows) {
+      if (!known[k] || !step_.setup) {
+        ContactBlock& block = pool_.block(n);
+        const int lane = ContactPool::lane(n);
+        partner(n).proof = f.memory.proof;
+        block.set(lane, 0, kLocalModelSize, &f.memory.model);
+        block.set(lane, kLocalModelSize, 10, &f.memory.on_a);
+      }
+      count_listed(f, n, body);
     }
     partner(n).proof.contact = n;
-    update_listed(n, body, f, known[k]);
-    count_listed(f, n, body);
     if (!known[k] && reentrant && !step_.setup) inherit(n, body, former, formers, f);
   }
   for (int i = 0; i < formers; ++i)
