@@ -64,12 +64,17 @@ FlatFeatures find_flat_features(const Shape& shape);
 int nearest_face(const FlatFeatures& features, const Vec3& d, double cosine);
 
 // The straight line of constant normal through a surface point, across patches as long as it goes straight
-// on. `at` may lie on a joint: then the patches beside it are tried too.
-// False where there is none, or none whose normal is within `angle` (rad) of d.
+// on; of several the one whose lower end is highest along d. False where there is none, or none whose normal
+// is within `angle` (rad) of d.
 struct RuledLine {
   Vec3 ends[2];
 };
-bool ruled_line(const Shape& shape, const SurfacePoint& at, const Vec3& d, double angle, RuledLine* line);
+// Which patches beside `at`'s own are tried too: those that the point lies on the joint with, or also those
+// whose lines end at a joint, wherever on its patch the point is: next to a rounded rim a small turn leads to
+// them.
+enum class Beside { point, patch };
+bool ruled_line(const Shape& shape, const SurfacePoint& at, const Vec3& d, double angle, Beside beside,
+                RuledLine* line);
 
 // The support set of a body in unit direction d (shape frame, scale 1) widened by `tolerance` (length): the
 // face, else the crease, else the ruled line all of whose points have d . x >= h(d) - tolerance; else the

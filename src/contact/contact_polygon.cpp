@@ -7,7 +7,6 @@
 #include <limits>
 
 #include "body/flat_faces.h"
-#include "body/ruled_lines.h"
 #include "body/support.h"
 
 namespace nurbs {
@@ -201,12 +200,9 @@ class FaceContact {
       least = std::min(least,
                        segment_room({incident_.vertex(edge.ends[0]), incident_.vertex(edge.ends[1])}, most));
     }
-    const Shape& shape = *incident_.shape;
-    if (!(least > 0) || shape.flats.ruling.empty()) return least;
-    const Vec3 d = incident_.turned_back(-plane_.normal);
+    if (!(least > 0)) return 0;
     RuledLine line;
-    const bool any = ruled_line_near(shape, find_hull_support(shape, d).where, d, kLineAngle, &line);
-    return any ? std::min(least, segment_room(line.ends, most)) : least;
+    return incident_line(Beside::patch, &line) ? std::min(least, segment_room(line.ends, most)) : least;
   }
 
   // `swallowed`: the reference face lies inside the incident one.
@@ -394,16 +390,16 @@ class FaceContact {
   }
 
   // The incident body's ruled line that is deepest.
-  bool incident_line(RuledLine* line) const {
+  bool incident_line(Beside beside, RuledLine* line) const {
     const Vec3 d = incident_.turned_back(-plane_.normal);
     const Shape& shape = *incident_.shape;
     return !shape.flats.ruling.empty() &&
-           ruled_line(shape, find_hull_support(shape, d).where, d, kLineAngle, line);
+           ruled_line(shape, find_hull_support(shape, d).where, d, kLineAngle, beside, line);
   }
 
   bool line_points(double most) {
     RuledLine line;
-    if (!incident_line(&line) || !segment(line.ends, {-1, -1}, most, &points_, &whole_)) return false;
+    if (!incident_line(Beside::point, &line) || !segment(line.ends, {-1, -1}, most, &points_, &whole_)) return false;
     ruled_ = true;
     return true;
   }
