@@ -11,7 +11,6 @@
 namespace nurbs {
 
 struct Shape;
-struct Support;
 
 // How far a face may be from its plane and a line from straight, in bounding radii: room for the decimals of
 // a shape file. A contact's gap on such a face errs by as much.
@@ -93,7 +92,7 @@ struct SupportSet {
 SupportSet support_set(const Shape& shape, const Vec3& d, double tolerance);
 
 // The least tolerance with which support_set() is more than a point; infinite without flat features near. No
-// search: `support` is that along d.
-double feature_lag(const Shape& shape, const Vec3& d, const Support& support);
+// search: h is the support function along d, `where` the support point.
+double feature_lag(const Shape& shape, const Vec3& d, double h, const SurfacePoint& where);
 
 }  // namespace nurbs

@@ -147,7 +147,7 @@ SupportSet support_set(const Shape& shape, const Vec3& d, double tolerance) {
   return set;
 }
 
-double feature_lag(const Shape& shape, const Vec3& d, const Support& support) {
+double feature_lag(const Shape& shape, const Vec3& d, double h, const SurfacePoint& where) {
   const FlatFeatures& flats = shape.flats;
   double highest = -std::numeric_limits<double>::infinity();  // of the features' lowest points
   const int f = nearest_face(flats, d, kFaceCosine);
@@ -160,9 +160,9 @@ double feature_lag(const Shape& shape, const Vec3& d, const Support& support) {
     highest =
         std::max(highest, std::min(d.dot(flats.vertices[edge.ends[0]]), d.dot(flats.vertices[edge.ends[1]])));
   RuledLine line;
-  if (ruled_line(shape, support.where, d, M_PI / 4, Beside::patch, &line))
+  if (ruled_line(shape, where, d, M_PI / 4, Beside::patch, &line))
     highest = std::max(highest, std::min(d.dot(line.ends[0]), d.dot(line.ends[1])));
-  return support.h - highest;
+  return h - highest;
 }
 
 }  // namespace nurbs

@@ -467,8 +467,8 @@ bool line_contact(const Body& a, const Body& b, const Vec3& d, double overlap, d
   // Both bodies need a feature that lags no more than that behind their support.
   const auto lag = [](const Body& body, const Vec3& along, const SurfacePoint* start) {
     const Vec3 on_body = body.turned_back(along);
-    return body.frame.scale *
-           feature_lag(*body.shape, on_body, find_hull_support(*body.shape, on_body, start));
+    const Support top = find_hull_support(*body.shape, on_body, start);
+    return body.frame.scale * feature_lag(*body.shape, on_body, top.h, top.where);
   };
   const FlatFeatures &flats_a = a.shape->flats, &flats_b = b.shape->flats;
   *room = kInfinite;
@@ -530,10 +530,7 @@ namespace {
 // How far a body may go before it has a flat feature within reach of a plane, where it has none now. `d`:
 // towards the plane, shape axes.
 double clear_way(const Particle& particle, const Vec3& d, double reach, const SupportSet& point) {
-  Support support;
-  support.where = point.where;
-  support.h = point.h;
-  const double room = feature_lag(*particle.shape, d, support) - reach / particle.scale;
+  const double room = feature_lag(*particle.shape, d, point.h, point.where) - reach / particle.scale;
   return kWayShare * particle.scale * std::clamp(room, 0.0, kMostRoom * particle.shape->bounding_radius);
 }
 
