@@ -266,12 +266,6 @@ class FaceContact {
            plane_.level;
   }
 
-  // How deep a place is inside the reference face.
-  double inside(const ConvexPolygon& polygon, const Vec2& at) const {
-    ConvexPolygon point;
-    point.add(at, 0, 0);
-    return depth_inside(polygon, point);
-  }
   // Of room(): the face opposite is either elsewhere, or has a place over the reference that is high.
   double face_room(const Opposite& o, double most) const {
     if (o.face < 0) return kInfinite;
@@ -287,7 +281,8 @@ class FaceContact {
     for (const double t : {0.0, 0.5, 1.0}) {
       const Vec2 at = middle + t * (other - middle);
       const double high = height(o, at) - most;
-      if (high > best) best = std::max(best, std::min({high, inside(window_, at), inside(o.outline, at)}));
+      if (high > best)
+        best = std::max(best, std::min({high, depth_inside(window_, at), depth_inside(o.outline, at)}));
     }
     return std::max(best, 0.0);
   }
@@ -301,7 +296,7 @@ class FaceContact {
     if (!clip_segment(window_, at_p, at_q, slack_, &part)) return 0;
     for (const double s : {0.1, 0.5, 0.9}) {
       const double t = part.t0 + s * (part.t1 - part.t0), high = gap_p + t * (gap_q - gap_p) - most;
-      if (high > best) best = std::max(best, std::min(high, inside(window_, at_p + t * (at_q - at_p))));
+      if (high > best) best = std::max(best, std::min(high, depth_inside(window_, at_p + t * (at_q - at_p))));
     }
     return std::max(best, 0.0);
   }
@@ -399,7 +394,8 @@ class FaceContact {
 
   bool line_points(double most) {
     RuledLine line;
-    if (!incident_line(Beside::point, &line) || !segment(line.ends, {-1, -1}, most, &points_, &whole_)) return false;
+    if (!incident_line(Beside::point, &line) || !segment(line.ends, {-1, -1}, most, &points_, &whole_))
+      return false;
     ruled_ = true;
     return true;
   }
