@@ -27,27 +27,14 @@ bool is_least(const PairFrame& pair, const Vec3& n, double overlap, double m) {
 
 // The overlap along n between a point of A and one of B, at least as deep as the contact's, and at most it
 // plus `excess`.
-bool set_met(const PairFrame& pair, const Vec3& n, const PointPair& points, double excess, double slack,
-             double tolerance, JointSolution* s) {
+bool meet_along(const PairFrame& pair, const Vec3& n, const PointPair& points, double excess, double slack,
+                double tolerance, JointSolution* s) {
   const double gap = n.dot(points.b - points.a);
-  Bracket bracket;
   const double noise = slack + pair.scale_a * pair.a->joint_slack + pair.scale_b * pair.b->joint_slack +
                        kRoundoff * pair.reach;
-  bracket.direction = n;
-  bracket.lower = gap - excess - noise;
-  bracket.upper = gap + noise;
-  bracket.angle2 = 0;
-  bracket.unique = 0;
+  const Bracket bracket{gap - excess - noise, gap + noise, n, 0, 0};
   if (!(bracket.width() <= tolerance)) return false;
-  s->points = points;
-  s->points.na = n;
-  s->points.nb = -n;
-  s->bracket = bracket;
-  s->normal = n;
-  s->gap = gap;
-  s->dented = true;
-  s->converged = true;
-  ++s->iterations;
+  s->set_met(points, bracket, 1);
   return true;
 }
 
@@ -88,7 +75,7 @@ bool meet_face(const PairFrame& pair, const Vec3& direction, int owner, double t
   const SurfacePoint on_face = stays ? last : SurfacePoint{face.patch, 0.5, 0.5};
   points.on_a = of_a ? on_face : top.where;
   points.on_b = of_a ? top.where : on_face;
-  return set_met(pair, n, points, other_scale * (top.upper - top.h), scale * face.slack, tolerance, s);
+  return meet_along(pair, n, points, other_scale * (top.upper - top.h), scale * face.slack, tolerance, s);
 }
 
 // The crease that lies furthest along d, of those about square to it; nullptr without one.
@@ -135,8 +122,8 @@ bool meet_creases(const PairFrame& pair, const Vec3& direction, double tolerance
   points.on_a = a.where;
   points.on_b = b.where;
   const double p = pair.scale_a * a.upper + pair.scale_b * b.upper - n.dot(pair.offset);
-  return set_met(pair, n, points, std::max(0.0, p - overlap),
-                 pair.scale_a * edge_a->slack + pair.scale_b * edge_b->slack, tolerance, s);
+  return meet_along(pair, n, points, std::max(0.0, p - overlap),
+                    pair.scale_a * edge_a->slack + pair.scale_b * edge_b->slack, tolerance, s);
 }
 
 }  // namespace

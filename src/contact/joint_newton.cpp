@@ -210,6 +210,18 @@ __attribute__((noinline)) void draw_nearer(const PairFrame& pair, const Steps& s
 
 }  // namespace
 
+void JointSolution::set_met(const PointPair& at, const Bracket& along, int solved) {
+  bracket = along;
+  normal = along.direction;
+  points = at;
+  points.na = normal;
+  points.nb = -normal;
+  gap = std::clamp(normal.dot(at.b - at.a), along.lower, along.upper);
+  iterations += solved;
+  dented = true;
+  converged = true;
+}
+
 JointSolution solve_joint(const PairFrame& pair, const SurfacePoint& on_a, const SurfacePoint& on_b,
                           double tolerance, double enough, int cap) {
   JointSolution out;
