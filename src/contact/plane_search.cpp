@@ -37,15 +37,15 @@ bool solve_warm(const Shape& shape, const Vec3& d, SurfacePoint at, double toler
     const double det = f[3] * f[5] - f[4] * f[4];
     if (!(f[3] < 0 && det > kSingular * f[3] * f[5])) return false;
     const double r = 1 / det, du = r * (f[4] * f[2] - f[5] * f[1]), dv = r * (f[4] * f[1] - f[3] * f[2]);
-    const double u = at.u + du, v = at.v + dv;
-    if (!(u >= 0 && u <= 1 && v >= 0 && v <= 1)) return false;
+    const SurfacePoint next{at.patch, at.u + du, at.v + dv};
+    if (!next.on_patch()) return false;
     const double excess = support_excess(shape, 1, radii_at(shape, at, nullptr, n), d, n);
     const double roundoff = kRoundoff * shape.bounding_radius;
     if (excess <= tolerance &&
         (d - n).squaredNorm() * shape.bounding_radius <= std::max(tolerance, roundoff)) {
       Support& s = out->support;
       out->base = at;
-      s.where = {at.patch, u, v};
+      s.where = next;
       s.point = taylor(j, du, dv);
       s.h = d.dot(s.point);
       s.upper = f[0] + excess + roundoff;
@@ -53,8 +53,7 @@ bool solve_warm(const Shape& shape, const Vec3& d, SurfacePoint at, double toler
       s.converged = s.h >= f[0] - roundoff && s.h <= s.upper;
       return s.converged;
     }
-    at.u = u;
-    at.v = v;
+    at = next;
   }
   return false;
 }
@@ -144,7 +143,7 @@ class PlaneLadder {
   // The support mapping at large: across patches, from the last point or the atlas.
   void search(ContactResult* r) {
     const bool warm = memory_.on_b.patch >= 0;
-    const SurfacePoint start{static_cast<int>(memory_.on_b.patch), memory_.on_b.u, memory_.on_b.v};
+    const SurfacePoint start = surface_point(memory_.on_b);
     r->rung = warm ? Rung::warm : Rung::cold;
     finish(find_hull_support(shape_, d_, warm ? &start : nullptr), r);
   }
