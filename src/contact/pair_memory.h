@@ -179,6 +179,12 @@ ContactResult solve_plane_contact(const Particle& particle, double height, const
 inline bool is_unit(const Quat& q) {
   return std::abs(q.squaredNorm() - 1) <= kUnitTurn;
 }
+// Drifted quaternions would scale the bodies.
+inline Particle with_unit_turn(const Particle& p) {
+  Particle unit = p;
+  unit.q.normalize();
+  return unit;
+}
 
 inline bool finite(const Particle& p) {
   return std::isfinite(p.x.sum() + p.q.coeffs().sum() + p.scale) && p.scale > 0;

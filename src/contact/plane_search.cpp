@@ -205,10 +205,8 @@ class PlaneLadder {
 ContactResult find_plane_contact(const Particle& particle, const Vec3& origin, const Vec3& normal,
                                  const ContactSettings& settings, double* memory) {
   if (!is_unit(particle.q)) {
-    Particle unit = particle;
-    unit.q.normalize();
-    if (!is_unit(unit.q)) return ContactResult();
-    return find_plane_contact(unit, origin, normal, settings, memory);
+    const Particle unit = with_unit_turn(particle);
+    return is_unit(unit.q) ? find_plane_contact(unit, origin, normal, settings, memory) : ContactResult();
   }
   PairMemory& m = memory_at(memory);
   adopt(pair_stamp(stamp(normal), stamp(particle), Solver::ladder), &m);
