@@ -67,13 +67,12 @@ bool meet_crease(const PairFrame& pair, const Vec3& direction, double tolerance,
   Vec3 d = direction;
   for (int k = 0; k < kWarmIterations; ++k) {
     const Vec3 on_b = pair.direction_on_b(d);
-    const Support sa = find_hull_support(*pair.a, d, &p.on_a, kSupportShare * tolerance / pair.scale_a),
-                  sb = find_hull_support(*pair.b, on_b, &p.on_b, kSupportShare * tolerance / pair.scale_b);
+    const auto [sa, sb] = hull_supports(pair, d, &p.on_a, &p.on_b, tolerance);
     p.a = pair.place_a(sa.point);
     p.b = pair.place_b(sb.point);
     p.on_a = sa.where;
     p.on_b = sb.where;
-    const double upper = pair.scale_a * sa.upper + pair.scale_b * sb.upper - d.dot(pair.offset);
+    const double upper = pair.overlap_along(d, sa.upper, sb.upper);
     const Bracket bracket = bracket_along(pair, d, upper, p, ball(pair, *pair.a, sa, pair.scale_a, d),
                                           ball(pair, *pair.b, sb, pair.scale_b, on_b));
     const Vec3 g = p.a - p.b, t = d.unitOrthogonal(), across = d.cross(t);
@@ -153,7 +152,7 @@ bool meet_bridge(const PairFrame& pair, const Vec3& direction, double tolerance,
       points.on_b = at.of_a ? at.one.where : nearer.where;
       const Support a = confirm_support(*pair.a, d, points.on_a),
                     b = confirm_support(*pair.b, on_b, points.on_b);
-      const double upper = pair.scale_a * a.upper + pair.scale_b * b.upper - d.dot(pair.offset);
+      const double upper = pair.overlap_along(d, a.upper, b.upper);
       const auto ball_at = [&](const Support& of, bool on_a) {
         return on_a ? ball(pair, *pair.a, of, pair.scale_a, d) : ball(pair, *pair.b, of, pair.scale_b, on_b);
       };

@@ -116,12 +116,10 @@ bool meet_creases(const PairFrame& pair, const Vec3& direction, double tolerance
   points.b = y0 + to_y * v;
   const double overlap = n.dot(points.a - points.b);
   if (!is_least(pair, n, overlap, margin * sine)) return false;
-  const Support a = find_hull_support(*pair.a, n, &s->points.on_a, kSupportShare * tolerance / pair.scale_a),
-                b = find_hull_support(*pair.b, pair.direction_on_b(n), &s->points.on_b,
-                                      kSupportShare * tolerance / pair.scale_b);
+  const auto [a, b] = hull_supports(pair, n, &s->points.on_a, &s->points.on_b, tolerance);
   points.on_a = a.where;
   points.on_b = b.where;
-  const double p = pair.scale_a * a.upper + pair.scale_b * b.upper - n.dot(pair.offset);
+  const double p = pair.overlap_along(n, a.upper, b.upper);
   return meet_along(pair, n, points, std::max(0.0, p - overlap),
                     pair.scale_a * edge_a->slack + pair.scale_b * edge_b->slack, tolerance, s);
 }

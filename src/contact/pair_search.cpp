@@ -140,7 +140,7 @@ class Ladder {
       return false;
     const Support a = confirm_support(*pair.a, s.normal, s.points.on_a),
                   b = confirm_support(*pair.b, pair.direction_on_b(s.normal), s.points.on_b);
-    const double p = pair.scale_a * a.upper + pair.scale_b * b.upper - s.normal.dot(pair.offset);
+    const double p = pair.overlap_along(s.normal, a.upper, b.upper);
     if (-p > s.bracket.lower) {
       s.bracket.lower = -p;
       s.bracket.direction = s.normal;
@@ -217,12 +217,8 @@ class Ladder {
   // Whether the overlap along a polished normal is that of a gap: of a body next to one much larger, or on a
   // flat, normals may be right to the tolerance of the angle, and the overlap along them not.
   static bool agrees(const PairFrame& pair, const JointSolution& s, double gap, double tolerance) {
-    const double enough = kSupportShare * tolerance;
-    const Support a = find_hull_support(*pair.a, s.normal, &s.points.on_a, enough / pair.scale_a),
-                  b = find_hull_support(*pair.b, pair.direction_on_b(s.normal), &s.points.on_b,
-                                        enough / pair.scale_b);
-    const double p = pair.scale_a * a.h + pair.scale_b * b.h - s.normal.dot(pair.offset);
-    return -p >= gap - kNormalShare * tolerance;
+    const auto [a, b] = hull_supports(pair, s.normal, &s.points.on_a, &s.points.on_b, tolerance);
+    return -pair.overlap_along(s.normal, a.h, b.h) >= gap - kNormalShare * tolerance;
   }
 
   // The polytope brackets the global answer; a stationary point that lies inside its bracket is a better
