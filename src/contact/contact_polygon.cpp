@@ -752,22 +752,24 @@ bool make_pair_polygon(const Particle& pa, const Particle& pb, const Vec3& norma
   if (clear) *clear = 0;
   if (pa.shape->flats.empty() || pb.shape->flats.empty()) return false;
   const Body a(0, pa, pa.x), b(1, pb, pa.x);
-  const int face_a = nearest_face(a.shape->flats, a.turned_back(normal), kFaceCosine);
-  const int face_b = nearest_face(b.shape->flats, b.turned_back(-normal), kFaceCosine);
-  double depth[2] = {kInfinite, kInfinite};  // along the normals of the two faces
   const double most = overlap + reach;
-  if (face_a >= 0) depth[0] = FaceContact(a, a.shape->flats.faces[face_a], b).depth(most);
-  if (face_b >= 0) depth[1] = FaceContact(b, b.shape->flats.faces[face_b], a).depth(most);
+  const auto contact = [&](int reference, int face) {
+    const Body &owner = reference == 0 ? a : b, &other = reference == 0 ? b : a;
+    return FaceContact(owner, owner.shape->flats.faces[face], other);
+  };
+  const Vec3 towards[2] = {a.turned_back(normal), b.turned_back(-normal)};
+  const int nearest[2] = {nearest_face(a.shape->flats, towards[0], kFaceCosine),
+                          nearest_face(b.shape->flats, towards[1], kFaceCosine)};
+  double depth[2] = {kInfinite, kInfinite};  // along the normals of the two faces
+  for (int k = 0; k < 2; ++k)
+    if (nearest[k] >= 0) depth[k] = contact(k, nearest[k]).depth(most);
   int first = old && old->count > 0 && old->reference == 1 ? 1 : 0;
   if (!(depth[first] <= most) || depth[1 - first] < depth[first] - kReferenceShare * overlap)
     first = 1 - first;
 
-  const auto contact = [&](int reference) {
-    const Body &owner = reference == 0 ? a : b, &other = reference == 0 ? b : a;
-    return FaceContact(owner, owner.shape->flats.faces[reference == 0 ? face_a : face_b], other);
-  };
   const auto attempt = [&](int reference, ContactPolygon* polygon, bool* swallowed) {
-    return depth[reference] <= most && contact(reference).make(overlap, reach, polygon, swallowed);
+    return depth[reference] <= most &&
+           contact(reference, nearest[reference]).make(overlap, reach, polygon, swallowed);
   };
   bool swallowed = false;
   if (attempt(first, out, &swallowed)) {
@@ -782,17 +784,15 @@ bool make_pair_polygon(const Particle& pa, const Particle& pb, const Vec3& norma
   *out = {};
   if (!clear) return false;
   // Other faces may become the nearest ones.
-  const auto keep_off = [&](const Body& owner, const Body& other, const Vec3& d) {
-    for (const FlatFace& face : owner.shape->flats.faces) {
-      if (!(room > 0)) return;
-      if (face.normal.dot(d) < kOtherFaceCosine) continue;
-      FaceContact contact(owner, face, other);
-      const double overlap_of = contact.depth(most);
-      room = std::min(room, overlap_of > most ? overlap_of - most : contact.room(reach - overlap));
+  for (int k = 0; k < 2; ++k) {
+    const std::vector<FlatFace>& faces = (k == 0 ? a : b).shape->flats.faces;
+    for (int face = 0; face < static_cast<int>(faces.size()) && room > 0; ++face) {
+      if (faces[face].normal.dot(towards[k]) < kOtherFaceCosine) continue;
+      FaceContact other = contact(k, face);
+      const double overlap_of = face == nearest[k] ? depth[k] : other.depth(most);
+      room = std::min(room, overlap_of > most ? overlap_of - most : other.room(reach - overlap));
     }
-  };
-  keep_off(a, b, a.turned_back(normal));
-  keep_off(b, a, b.turned_back(-normal));
+  }
   const double smaller = std::min(a.radius(), b.radius()), larger = std::max(a.radius(), b.radius());
   *clear = kWayShare * std::min(room, kMostRoom * smaller) * smaller / larger;
   return false;
