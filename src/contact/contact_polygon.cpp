@@ -166,11 +166,6 @@ void set_ring(const Shape& shape, int body, int face, ContactPolygon* out) {
   }
 }
 
-double gap_below(const Body& incident, const ReferencePlane& plane) {
-  const double h = find_hull_support(*incident.shape, incident.turned_back(-plane.normal)).h;
-  return plane.normal.dot(incident.frame.x - plane.origin) - incident.frame.scale * h - plane.level;
-}
-
 // One attempt at a pair's polygon with a given face as the reference.
 class FaceContact {
  public:
@@ -184,10 +179,11 @@ class FaceContact {
   // Overlap along the face's normal; where it exceeds `most`, a lower bound above that may be given.
   double depth(double most) const {
     const Shape& shape = *incident_.shape;
-    const Vec3 d = incident_.turned_back(-plane_.normal);
-    const Vec3& node = shape.atlas.point[shape.atlas.nearest(d)];
+    const Vec3& node = shape.atlas.point[shape.atlas.nearest(down())];
     const double least = -plane_.height(incident_.place(node));
-    return least > most ? least : -gap_below(incident_, plane_);
+    if (least > most) return least;
+    const double h = find_hull_support(shape, down()).h;
+    return plane_.level - (plane_.normal.dot(incident_.frame.x - plane_.origin) - incident_.frame.scale * h);
   }
 
   // How far all points of both bodies may go while something of whatever may lie over the reference face is
@@ -224,6 +220,9 @@ class FaceContact {
   }
 
  private:
+  // Towards the reference plane, axes of the incident body's shape.
+  Vec3 down() const { return incident_.turned_back(-plane_.normal); }
+
   std::uint32_t crossing(int side_of_reference, int side_of_incident) const {
     return reference_.index == 0 ? crossing_id(side_of_reference, side_of_incident)
                                  : crossing_id(side_of_incident, side_of_reference);
@@ -250,7 +249,7 @@ class FaceContact {
   Opposite opposite() const {
     Opposite o;
     const FlatFeatures& flats = incident_.shape->flats;
-    o.face = nearest_face(flats, incident_.turned_back(-plane_.normal), kFaceCosine);
+    o.face = nearest_face(flats, down(), kFaceCosine);
     if (o.face < 0) return o;
     const FlatFace& face = flats.faces[o.face];
     for (int i = 0; i < static_cast<int>(face.outline.size()); ++i)
@@ -386,10 +385,9 @@ class FaceContact {
 
   // The incident body's ruled line that is deepest.
   bool incident_line(Beside beside, RuledLine* line) const {
-    const Vec3 d = incident_.turned_back(-plane_.normal);
     const Shape& shape = *incident_.shape;
     return !shape.flats.ruling.empty() &&
-           ruled_line(shape, find_hull_support(shape, d).where, d, kLineAngle, beside, line);
+           ruled_line(shape, find_hull_support(shape, down()).where, down(), kLineAngle, beside, line);
   }
 
   bool line_points(double most) {

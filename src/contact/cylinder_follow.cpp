@@ -185,13 +185,8 @@ class Follower {
     remember_point(at, &memory_.on_b);
     store(particle_.q, memory_.proof.q_b);
     drop_model(&memory_.model);
-    const LocalRate local = local_rate(shape_, particle_.scale, base);
-    if (!may_serve(0, local.rate, 0, turned2_before, gap, tolerance_, size_)) return;
-    scale(particle_.scale, &jet);
-    SupportModel& model = memory_.model.b;
-    if (!make_support_model(Mat3::Identity(), Vec3::Zero(), jet, local, &model)) return;
-    limit_turn(shape_, particle_.scale, kNormalMargin, &model);
-    memory_.model.unique = kCylinderModel;
+    if (make_wall_model(particle_, base, turned2_before, gap, tolerance_, size_, jet, &memory_.model.b))
+      memory_.model.unique = kCylinderModel;
   }
 
   void set(double gap, const Vec3& c, const Vec3& point, Rung rung, int iterations) {

@@ -146,6 +146,18 @@ inline void make_local_model(const ModelSide& a, const ModelSide& b, double uniq
   model->unique = unique;
 }
 
+// The same of one body against a wall; false where it would not serve or there can't be one. `jet`: its jet
+// there in its own axes, shape lengths on entry and the lab's on return.
+inline bool make_wall_model(const Particle& particle, const SurfacePoint& at, double turned2, double gap,
+                            double tolerance, double size, JetLanes& jet, SupportModel* model) {
+  const LocalRate local = local_rate(*particle.shape, particle.scale, at);
+  if (!may_serve(0, local.rate, 0, turned2, gap, tolerance, size)) return false;
+  scale(particle.scale, &jet);
+  if (!make_support_model(Mat3::Identity(), Vec3::Zero(), jet, local, model)) return false;
+  limit_turn(*particle.shape, particle.scale, kNormalMargin, model);
+  return true;
+}
+
 inline void set_local(const LocalContact& c, const Vec3& offset, double reach, ContactResult* r) {
   const double error = c.error + kRoundoff * offset.lpNorm<1>();
   r->rung = Rung::local_model;

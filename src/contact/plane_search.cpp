@@ -176,15 +176,11 @@ class PlaneLadder {
   }
 
   // A plane asks one support only: the model needs no uniqueness, but no dents near either.
-  void remember_model(const WarmSupport& s, double turned2_before, double gap) {
-    const LocalRate local = local_rate(shape_, particle_.scale, s.base);
-    if (!may_serve(0, local.rate, 0, turned2_before, gap, settings_.tolerance, radius_)) return;
+  void remember_model(WarmSupport& s, double turned2_before, double gap) {
     if (shape_.dented() && !(shape_.normal_map.radius_at(d_) < kFarAway)) return;
-    JetLanes jet = s.jet;
-    scale(particle_.scale, &jet);
-    SupportModel& model = memory_.model.b;
-    if (!make_support_model(Mat3::Identity(), Vec3::Zero(), jet, local, &model)) return;
-    limit_turn(shape_, particle_.scale, kNormalMargin, &model);
+    if (!make_wall_model(particle_, s.base, turned2_before, gap, settings_.tolerance, radius_, s.jet,
+                         &memory_.model.b))
+      return;
     memory_.model.a = plane_model(normal_);
     memory_.model.unique = kFarAway;
   }
