@@ -19,7 +19,7 @@ struct ConvexPolygon {
   Vec2 corner[kMost];
   int owner[kMost], side[kMost];
 
-  void add(const Vec2& at, int from, int index) {
+  void add(const Vec2& at, int from = 0, int index = 0) {
     corner[count] = at;
     owner[count] = from;
     side[count++] = index;

@@ -281,7 +281,7 @@ class Finder {
 
   void thin_outline(FlatFace& face) const {
     ConvexPolygon polygon;
-    for (const int v : face.outline) polygon.add(face.project(out_.vertices[v]), 0, 0);
+    for (const int v : face.outline) polygon.add(face.project(out_.vertices[v]));
     face.weight.resize(face.outline.size());
     corner_weights(polygon, face.project(face.centroid), face.weight.data());
     int kept[ConvexPolygon::kMost];

@@ -64,6 +64,9 @@ struct ReferencePlane {
     return origin + at[0] * u + at[1] * v + (level + height) * normal;
   }
 };
+ReferencePlane plane_along(const Vec3& origin, const Vec3& normal, const Vec3& u) {
+  return {origin, normal, u, normal.cross(u), 0};
+}
 
 // Points on their way into a polygon: in the plane, and on the incident body.
 struct Candidates {
@@ -76,7 +79,7 @@ struct Candidates {
     on_body[plane.count] = point;
     gap[plane.count] = height;
     id[plane.count] = name;
-    plane.add(at, 0, 0);
+    plane.add(at);
   }
   bool within(double most) const {
     return std::all_of(gap, gap + plane.count, [&](double g) { return g <= most; });
@@ -117,7 +120,7 @@ bool finish(const Candidates& from, double least, const Vec2* centre, ContactPol
   int kept[ConvexPolygon::kMost];
   const int count = thin(from.plane, kContactPoints, 0, kept);
   ConvexPolygon few;
-  for (int i = 0; i < count; ++i) few.add(from.plane.corner[kept[i]], 0, 0);
+  for (int i = 0; i < count; ++i) few.add(from.plane.corner[kept[i]]);
   double weight[ConvexPolygon::kMost];
   corner_weights(few, centre ? *centre : polygon_centroid(from.plane), weight);
   for (int i = 0; i < count; ++i) set_point(from, kept[i], weight[i], out);
@@ -230,8 +233,7 @@ class FaceContact {
 
   void set_window() {
     window_.count = 0;
-    for (const int v : face_.outline)
-      window_.add(plane_.project(reference_.place(reference_.vertex(v))), 0, 0);
+    for (const int v : face_.outline) window_.add(plane_.project(reference_.place(reference_.vertex(v))));
   }
 
   // The incident face opposite the reference, in the reference plane.
@@ -253,7 +255,7 @@ class FaceContact {
     if (o.face < 0) return o;
     const FlatFace& face = flats.faces[o.face];
     for (int i = 0; i < static_cast<int>(face.outline.size()); ++i)
-      o.outline.add(plane_.project(incident_.place(incident_.vertex(vertex(face, i)))), 0, 0);
+      o.outline.add(plane_.project(incident_.place(incident_.vertex(vertex(face, i)))));
     o.normal = incident_.turned(face.normal);
     o.level = incident_.frame.scale * face.offset - o.normal.dot(plane_.origin - incident_.frame.x);
     return o;
@@ -449,7 +451,7 @@ struct LinePair {
 LinePair pair_of(const Line& a, const Line& b, const Vec3& d) {
   const Vec3 u = (a.ends[1] - a.ends[0]).normalized();
   const Vec3 normal = (d - d.dot(u) * u).normalized();
-  LinePair lines{a, b, {a.ends[0], normal, u, normal.cross(u), 0}, u.dot(a.ends[1] - a.ends[0]), {}, {}};
+  LinePair lines{a, b, plane_along(a.ends[0], normal, u), u.dot(a.ends[1] - a.ends[0]), {}, {}};
   lines.p = lines.plane.project(b.ends[0]);
   lines.q = lines.plane.project(b.ends[1]);
   return lines;
@@ -576,15 +578,12 @@ namespace {
 // What of a feature lies over a region.
 class RegionClip {
  public:
-  RegionClip(const PlaneRegion& region, double size) : region_(region), slack_(kClipSlack * size) {
-    u_ = region.normal.unitOrthogonal();
-    v_ = region.normal.cross(u_);
-  }
-  Vec2 project(const Vec3& x) const { return {u_.dot(x - region_.origin), v_.dot(x - region_.origin)}; }
-  double height(const Vec3& x) const { return region_.normal.dot(x - region_.origin); }
-  Vec3 lift(const Vec2& at, double h) const {
-    return region_.origin + at[0] * u_ + at[1] * v_ + h * region_.normal;
-  }
+  RegionClip(const PlaneRegion& region, double size)
+      : plane(plane_along(region.origin, region.normal, region.normal.unitOrthogonal())),
+        region_(region),
+        slack_(kClipSlack * size) {}
+
+  const ReferencePlane plane;
 
   // Corners of the hull of the part of a polygon; whether it is the whole polygon.
   bool polygon(const ConvexPolygon& subject, std::vector<Vec2>* hull) const {
@@ -619,7 +618,7 @@ class RegionClip {
   double room(const ConvexPolygon& points) const {
     double least = kInfinite;
     for (std::size_t k = 0; k + 1 < region_.border.size(); k += 2) {
-      const Vec2 a = project(region_.border[k]), way = project(region_.border[k + 1]) - a;
+      const Vec2 a = plane.project(region_.border[k]), way = plane.project(region_.border[k + 1]) - a;
       for (int i = 0; i < points.count; ++i) {
         const Vec2 x = points.corner[i] - a;
         const double t = std::clamp(x.dot(way) / way.squaredNorm(), 0.0, 1.0);
@@ -636,7 +635,7 @@ class RegionClip {
     for (const int end : region_.ends) {
       ConvexPolygon cell;
       for (int k = first; k < end && cell.count < kOutlinePoints; ++k)
-        cell.add(project(region_.corners[k]), 0, 0);
+        cell.add(plane.project(region_.corners[k]));
       if (polygon_area(cell) < 0) std::reverse(cell.corner, cell.corner + cell.count);
       visit(cell);
       first = end;
@@ -665,7 +664,6 @@ class RegionClip {
 
   const PlaneRegion& region_;
   const double slack_;
-  Vec3 u_, v_;
 };
 
 }  // namespace
@@ -676,19 +674,15 @@ RegionContact make_region_polygon(const Particle& particle, const PlaneRegion& r
   if (clear) *clear = 0;
   const Shape& shape = *particle.shape;
   if (shape.flats.empty()) return RegionContact::point;
-  const BodyFrame body = body_frame(particle);
-  const auto place = [&](const Vec3& s) -> Vec3 { return body.x + body.scale * (body.axes * s); };
-  const auto to_shape = [&](const Vec3& x) -> Vec3 {
-    return body.axes.transpose() * (x - body.x) / body.scale;
-  };
+  const Body body(1, particle, Vec3::Zero());
   const auto placed = [&](double room) {
     out->offset = region.normal.dot(region.origin - frame);
     out->room = room;
-    set_marks(plane_frame(frame), body, out);
+    set_marks(plane_frame(frame), body.frame, out);
     return RegionContact::polygon;
   };
-  const Vec3 d = body.axes.transpose() * -region.normal;
-  const SupportSet set = support_set(shape, d, reach / body.scale);
+  const Vec3 d = body.turned_back(-region.normal);
+  const SupportSet set = support_set(shape, d, reach / body.frame.scale);
   if (set.count < 2) {
     if (clear) *clear = clear_way(particle, d, reach, set);
     return RegionContact::point;
@@ -698,42 +692,41 @@ RegionContact make_region_polygon(const Particle& particle, const PlaneRegion& r
     return placed(room);
   };
   if (region.unbounded) return whole(kInfinite);
-  const RegionClip clip(region, body.scale * shape.bounding_radius);
+  const RegionClip clip(region, body.radius());
   Candidates points;
   double size = 0;
   if (set.face >= 0) {
     const FlatFace& face = shape.flats.faces[set.face];
     ConvexPolygon subject;  // clockwise seen from the body's outside
     for (std::size_t i = face.outline.size(); i-- > 0;)
-      subject.add(clip.project(place(shape.flats.vertices[face.outline[i]])), 0, 0);
+      subject.add(clip.plane.project(body.place(body.vertex(face.outline[i]))));
     std::vector<Vec2> hull;
     if (clip.polygon(subject, &hull)) return whole(clip.room(subject));
     if (hull.size() < 2) return RegionContact::clear;
-    const Vec3 normal = body.axes * face.normal;
-    const double level = body.scale * face.offset - normal.dot(region.origin - body.x);
+    const Vec3 normal = body.turned(face.normal);
+    const double level = body.frame.scale * face.offset - normal.dot(region.origin - body.frame.x);
     for (const Vec2& at : hull) {
       if (points.plane.count == ConvexPolygon::kMost) break;
-      const Vec3 flat = clip.lift(at, 0) - region.origin;
+      const Vec3 flat = clip.plane.lift(at, 0) - region.origin;
       const double h = (level - normal.dot(flat)) / normal.dot(region.normal);
-      points.add(at, to_shape(clip.lift(at, h)), h, 0);
+      points.add(at, body.to_shape(clip.plane.lift(at, h)), h, 0);
     }
     for (int i = 0; i < points.plane.count; ++i)
       size = std::max(size, (points.plane.corner[i] - points.plane.corner[0]).norm());
   } else {
-    const Vec3 p = place(set.point[0]), q = place(set.point[1]);
+    const Vec3 p = body.place(set.point[0]), q = body.place(set.point[1]);
     double low = 0, high = 1;
-    if (clip.segment(clip.project(p), clip.project(q), &low, &high)) {
+    if (clip.segment(clip.plane.project(p), clip.plane.project(q), &low, &high)) {
       ConvexPolygon ends;
-      ends.add(clip.project(p), 0, 0);
-      ends.add(clip.project(q), 0, 0);
+      ends.add(clip.plane.project(p));
+      ends.add(clip.plane.project(q));
       return whole(clip.room(ends));
     }
     if (!(high > low)) return RegionContact::clear;
     size = (high - low) * (q - p).norm();
     for (const double t : {low, high}) {
       const Vec3 x = p + t * (q - p);
-      points.add({t, 0}, to_shape(x), clip.height(x), 0);
-      points.plane.corner[points.plane.count - 1] = {t * (q - p).norm(), 0};
+      points.add({t * (q - p).norm(), 0}, body.to_shape(x), clip.plane.height(x), 0);
     }
   }
   if (!finish(points, reach, nullptr, out)) return RegionContact::point;
