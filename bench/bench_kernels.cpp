@@ -70,6 +70,18 @@ ContactSettings host_settings() {  // as the pair style asks: contacts only, tol
   return settings;
 }
 
+// Time of this thread for a call, s.
+template <class Call>
+double timed(const Call& call) {
+  const double cost = clock_cost(), start = thread_seconds();
+  call();
+  return thread_seconds() - start - cost;
+}
+// Ends the iteration of a kernel that times itself: so many calls took so long.
+void set_time(benchmark::State& state, double seconds, int calls) {
+  state.SetIterationTime(std::max(1e-9, seconds) / calls);
+}
+
 // --- surfaces and supports
 // ------------------------------------------------------------------------------------------
 
@@ -227,13 +239,14 @@ void turning(benchmark::State& state, int which, Solver solver) {
     std::memset(memory, 0, sizeof memory);
     find_contact(path[0].a, path[0].b, settings, memory);
     find_contact(path[1].a, path[1].b, settings, memory);
-    const double start = thread_seconds();
-    for (int i = 2; i < kSteps; ++i) {
-      const ContactResult r = find_contact(path[i].a, path[i].b, settings, memory);
-      warm += r.rung == Rung::warm || r.rung == Rung::local_model;
-      ++all;
-    }
-    state.SetIterationTime(std::max(1e-9, (thread_seconds() - start - clock_cost())) / (kSteps - 2));
+    const double spent = timed([&] {
+      for (int i = 2; i < kSteps; ++i) {
+        const ContactResult r = find_contact(path[i].a, path[i].b, settings, memory);
+        warm += r.rung == Rung::warm || r.rung == Rung::local_model;
+        ++all;
+      }
+    });
+    set_time(state, spent, kSteps - 2);
   }
   if (solver == Solver::ladder) state.counters["warm share"] = static_cast<double>(warm) / all;
 }
@@ -256,10 +269,11 @@ void plane(benchmark::State& state, int which, double turn) {
     std::memset(memory, 0, sizeof memory);
     const Vec3 up(0, 0, 1), origin(0, 0, path[0].x[2]);
     for (int i = 0; i < 2; ++i) find_plane_contact(path[i], origin, up, settings, memory);
-    const double start = thread_seconds();
-    for (int i = 2; i < kSteps; ++i)
-      benchmark::DoNotOptimize(find_plane_contact(path[i], origin, up, settings, memory).gap);
-    state.SetIterationTime(std::max(1e-9, (thread_seconds() - start - clock_cost())) / (kSteps - 2));
+    const double spent = timed([&] {
+      for (int i = 2; i < kSteps; ++i)
+        benchmark::DoNotOptimize(find_plane_contact(path[i], origin, up, settings, memory).gap);
+    });
+    set_time(state, spent, kSteps - 2);
   }
 }
 
@@ -290,12 +304,13 @@ void tube(benchmark::State& state, int which, double turn) {
       FormerContact former[kSurfaceContacts];
       for (int j = 0; j < last.count; ++j)
         former[j] = {last.contact[j].normal, &last.contact[j].memory, false};
-      const double start = thread_seconds();
-      find_cylinder_contacts(path[i], Vec3::Zero(), axis, radius, settings, 0, former, last.count, &survey,
-                             &found);
-      if (i > 1) spent += thread_seconds() - start - clock_cost();
+      const double step_time = timed([&] {
+        find_cylinder_contacts(path[i], Vec3::Zero(), axis, radius, settings, 0, former, last.count, &survey,
+                               &found);
+      });
+      if (i > 1) spent += step_time;
     }
-    state.SetIterationTime(std::max(1e-9, spent) / (kSteps - 2));
+    set_time(state, spent, kSteps - 2);
   }
 }
 
@@ -334,9 +349,7 @@ void staged_rest(benchmark::State& state, int which, double away) {
   int i = 0;
   for (auto _ : state) {
     pairs.place(i++ % 2);
-    const double start = thread_seconds();
-    pairs.compute();
-    state.SetIterationTime(std::max(1e-9, thread_seconds() - start - clock_cost()) / pairs.pairs());
+    set_time(state, timed([&] { pairs.compute(); }), pairs.pairs());
   }
   state.counters["served"] =
       pairs.counts().value[away > 1 ? ContactCounts::safe : ContactCounts::local_model] / pairs.pairs();
@@ -351,14 +364,13 @@ void staged_turning(benchmark::State& state, int which) {
     double spent = 0;
     for (int i = 0; i < kSteps; ++i) {
       pairs.place(i);
-      const double start = thread_seconds();
-      pairs.compute();
+      const double step_time = timed([&] { pairs.compute(); });
       if (i < 2) continue;
-      spent += thread_seconds() - start - clock_cost();
+      spent += step_time;
       warm = (pairs.counts().value[ContactCounts::warm] + pairs.counts().value[ContactCounts::local_model]) /
              pairs.pairs();
     }
-    state.SetIterationTime(spent / ((kSteps - 2) * pairs.pairs()));
+    set_time(state, spent, (kSteps - 2) * pairs.pairs());
   }
   state.counters["warm share"] = warm;
 }
@@ -422,8 +434,6 @@ double quantile(std::vector<double> x, double q) {
   return x[static_cast<size_t>(q * (x.size() - 1) + 0.5)];
 }
 
-constexpr const char* kByHand[] = {"/turning", "/plane", "/tube", "/step:"};  // kernels that time themselves
-
 // Collects every repetition of every benchmark, named body/kernel.
 class Collector : public benchmark::BenchmarkReporter {
  public:
@@ -440,9 +450,7 @@ class Collector : public benchmark::BenchmarkReporter {
         continue;
       }
       Row& row = find(name);
-      const bool manual = std::any_of(std::begin(kByHand), std::end(kByHand), [&](const char* kernel) {
-        return name.find(kernel) != std::string::npos;
-      });
+      const bool manual = !run.run_name.time_type.empty();
       row.ns.push_back(manual ? run.GetAdjustedRealTime() : run.GetAdjustedCPUTime());
       for (const auto& c : run.counters) row.counters[c.first] = c.second;
     }
@@ -468,6 +476,10 @@ std::vector<std::string> register_all() {
       names.push_back(body + kernel);
       return benchmark::RegisterBenchmark((body + kernel).c_str(), f)->Repetitions(kBatches);
     };
+    // Kernels that time themselves.
+    const auto add_timed = [&](const char* kernel, int iterations, auto&& f) {
+      add(kernel, f)->UseManualTime()->Iterations(iterations);
+    };
     add("evaluate2 throughput", [=](benchmark::State& s) { evaluate2_throughput(s, which); });
     add("evaluate2 latency", [=](benchmark::State& s) { evaluate2_latency(s, which); });
     add("atlas support_upper", [=](benchmark::State& s) { support_upper(s, which); });
@@ -476,33 +488,15 @@ std::vector<std::string> register_all() {
     add("skipped by budget", [=](benchmark::State& s) { budget(s, which); });
     add("rejected by bounds", [=](benchmark::State& s) { bounds(s, which); });
     add("resting", [=](benchmark::State& s) { resting(s, which); });
-    add("turning 2e-3", [=](benchmark::State& s) { turning(s, which, Solver::ladder); })
-        ->UseManualTime()
-        ->Iterations(kPaths);
-    add("turning 2e-3 cso", [=](benchmark::State& s) { turning(s, which, Solver::cso); })
-        ->UseManualTime()
-        ->Iterations(kPaths);
-    add("plane, turning 2e-3", [=](benchmark::State& s) { plane(s, which, kTurn); })
-        ->UseManualTime()
-        ->Iterations(kPaths);
-    add("plane, resting", [=](benchmark::State& s) { plane(s, which, kRest); })
-        ->UseManualTime()
-        ->Iterations(kPaths);
-    add("tube, turning 2e-3", [=](benchmark::State& s) { tube(s, which, kTurn); })
-        ->UseManualTime()
-        ->Iterations(kPaths);
-    add("tube, resting", [=](benchmark::State& s) { tube(s, which, kRest); })
-        ->UseManualTime()
-        ->Iterations(kPaths);
-    add("step: skipped neighbour", [=](benchmark::State& s) { staged_rest(s, which, 1.1); })
-        ->UseManualTime()
-        ->Iterations(50);
-    add("step: resting contact", [=](benchmark::State& s) { staged_rest(s, which, 1); })
-        ->UseManualTime()
-        ->Iterations(50);
-    add("step: turning contact", [=](benchmark::State& s) { staged_turning(s, which); })
-        ->UseManualTime()
-        ->Iterations(2);
+    add_timed("turning 2e-3", kPaths, [=](benchmark::State& s) { turning(s, which, Solver::ladder); });
+    add_timed("turning 2e-3 cso", kPaths, [=](benchmark::State& s) { turning(s, which, Solver::cso); });
+    add_timed("plane, turning 2e-3", kPaths, [=](benchmark::State& s) { plane(s, which, kTurn); });
+    add_timed("plane, resting", kPaths, [=](benchmark::State& s) { plane(s, which, kRest); });
+    add_timed("tube, turning 2e-3", kPaths, [=](benchmark::State& s) { tube(s, which, kTurn); });
+    add_timed("tube, resting", kPaths, [=](benchmark::State& s) { tube(s, which, kRest); });
+    add_timed("step: skipped neighbour", 50, [=](benchmark::State& s) { staged_rest(s, which, 1.1); });
+    add_timed("step: resting contact", 50, [=](benchmark::State& s) { staged_rest(s, which, 1); });
+    add_timed("step: turning contact", 2, [=](benchmark::State& s) { staged_turning(s, which); });
     add("integration", [=](benchmark::State& s) { integration(s, which); });
     add("cold", [=](benchmark::State& s) { cold(s, which, Solver::ladder); });
     add("cold cso", [=](benchmark::State& s) { cold(s, which, Solver::cso); });
@@ -515,15 +509,13 @@ Row cold_tail(const Body& body, int pairs, double* p99, double* worst, int* unre
   Random random(3);
   std::vector<double> ns;
   *unresolved = 0;
-  const double cost = clock_cost();
   for (int k = 0; k < pairs; ++k) {
     const Pair pair = test::random_pair_at(random, *body.shape, -random.uniform(1e-4, 1e-2));
     double best = 1;
     for (int repeat = 0; repeat < 3; ++repeat) {
       double memory[kPairMemorySize] = {};
-      const double start = thread_seconds();
-      const ContactResult r = find_contact(pair.a, pair.b, host_settings(), memory);
-      best = std::min(best, thread_seconds() - start - cost);
+      ContactResult r;
+      best = std::min(best, timed([&] { r = find_contact(pair.a, pair.b, host_settings(), memory); }));
       *unresolved += repeat == 0 && r.status == Status::unresolved;
     }
     ns.push_back(1e9 * best);

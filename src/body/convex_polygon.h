@@ -19,7 +19,7 @@ struct ConvexPolygon {
   Vec2 corner[kMost];
   int owner[kMost], side[kMost];
 
-  void add(const Vec2& at, int from, int index) {
+  void add(const Vec2& at, int from = 0, int index = 0) {
     corner[count] = at;
     owner[count] = from;
     side[count++] = index;
@@ -35,8 +35,9 @@ inline double cross2(const Vec2& a, const Vec2& b) {
 double polygon_area(const ConvexPolygon& polygon);
 Vec2 polygon_centroid(const ConvexPolygon& polygon);  // its area must be > 0
 
-// How far the corners of `points` are inside the polygon, at least: signed distance to the nearest of the
-// lines through its sides, < 0 outside.
+// How far a point, or the corners of `points` at least, are inside the polygon: signed distance to the
+// nearest of the lines through its sides, < 0 outside.
+double depth_inside(const ConvexPolygon& polygon, const Vec2& point);
 double depth_inside(const ConvexPolygon& polygon, const ConvexPolygon& points);
 
 // `subject` cut by `window`, both of at most kOutlinePoints corners (Sutherland & Hodgman, Comm. ACM 17

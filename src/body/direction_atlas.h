@@ -15,6 +15,8 @@ struct Shape;
 struct SurfacePoint {
   int patch = 0;
   double u = 0.5, v = 0.5;
+
+  bool on_patch() const { return u >= 0 && u <= 1 && v >= 0 && v <= 1; }
 };
 
 struct DirectionAtlas {

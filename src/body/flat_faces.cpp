@@ -281,7 +281,7 @@ class Finder {
 
   void thin_outline(FlatFace& face) const {
     ConvexPolygon polygon;
-    for (const int v : face.outline) polygon.add(face.project(out_.vertices[v]), 0, 0);
+    for (const int v : face.outline) polygon.add(face.project(out_.vertices[v]));
     face.weight.resize(face.outline.size());
     corner_weights(polygon, face.project(face.centroid), face.weight.data());
     int kept[ConvexPolygon::kMost];
@@ -309,6 +309,7 @@ class Finder {
   // How far a crease is beside the straight edge that it belongs to; 0 if it belongs to another one.
   double slack_of(const std::vector<Vec3>& points, const StraightEdge& edge) const {
     const Vec3 &from = out_.vertices[edge.ends[0]], &to = out_.vertices[edge.ends[1]];
+    if ((points.front() - from).cross(edge.direction).norm() > 4 * tolerance_) return 0;  // as most are
     const double off = beside(points, from, edge.direction);
     const double low = edge.direction.dot(points.front() - from),
                  high = edge.direction.dot(points.back() - from);

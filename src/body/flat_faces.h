@@ -11,7 +11,6 @@
 namespace nurbs {
 
 struct Shape;
-struct Support;
 
 // How far a face may be from its plane and a line from straight, in bounding radii: room for the decimals of
 // a shape file. A contact's gap on such a face errs by as much.
@@ -64,8 +63,10 @@ FlatFeatures find_flat_features(const Shape& shape);
 int nearest_face(const FlatFeatures& features, const Vec3& d, double cosine);
 
 // The straight line of constant normal through a surface point, across patches as long as it goes straight
-// on. `at` may lie on a joint: then the patches beside it are tried too.
-// False where there is none, or none whose normal is within `angle` (rad) of d.
+// on; or through one beside it: patches that the point lies on the joint with are tried, too, and those whose
+// lines end at a joint with its own, wherever on that it is, as next to a rounded rim a small turn leads to
+// them. Of several the one whose lower end is highest along d. False where there is none, or none whose
+// normal is within `angle` (rad) of d.
 struct RuledLine {
   Vec3 ends[2];
 };
@@ -88,7 +89,7 @@ struct SupportSet {
 SupportSet support_set(const Shape& shape, const Vec3& d, double tolerance);
 
 // The least tolerance with which support_set() is more than a point; infinite without flat features near. No
-// search: `support` is that along d.
-double feature_lag(const Shape& shape, const Vec3& d, const Support& support);
+// search: h is the support function along d, `where` the support point.
+double feature_lag(const Shape& shape, const Vec3& d, double h, const SurfacePoint& where);
 
 }  // namespace nurbs

@@ -5,7 +5,6 @@
 #include <limits>
 
 #include "body/connectivity.h"
-#include "body/ruled_lines.h"
 #include "body/shape.h"
 #include "body/support.h"
 
@@ -79,11 +78,9 @@ bool ends_ruling(const Shape& shape, const EdgeLink& link) {
          (link.edge == end_edge(ruling, false) || link.edge == end_edge(ruling, true));
 }
 
-// Of the lines of constant normal through a surface point, or through its neighbours over a joint that it
-// lies on, the one whose lower end is highest along d. `beside`: also those that end at its own patch,
-// wherever on it the point is.
-bool best_line(const Shape& shape, const SurfacePoint& at, const Vec3& d, double angle, bool beside,
-               RuledLine* line) {
+}  // namespace
+
+bool ruled_line(const Shape& shape, const SurfacePoint& at, const Vec3& d, double angle, RuledLine* line) {
   if (shape.flats.ruling.empty()) return false;
   double best = -std::numeric_limits<double>::infinity();
   const auto try_at = [&](const SurfacePoint& place) {
@@ -97,23 +94,12 @@ bool best_line(const Shape& shape, const SurfacePoint& at, const Vec3& d, double
     const double off = edge == 0 ? at.u : edge == 1 ? 1 - at.u : edge == 2 ? at.v : 1 - at.v;
     const EdgeLink& link = shape.links[at.patch][edge];
     if (link.patch < 0 || link.collapsed) continue;
-    if (off > kBesideJoint && !(beside && ends_ruling(shape, link))) continue;
+    if (off > kBesideJoint && !ends_ruling(shape, link)) continue;
     SurfacePoint on_edge = at;
-    if (beside) (edge < 2 ? on_edge.u : on_edge.v) = edge % 2;
+    (edge < 2 ? on_edge.u : on_edge.v) = edge % 2;
     try_at(across(shape.patches, link, on_edge, edge));
   }
   return best > -std::numeric_limits<double>::infinity();
-}
-
-}  // namespace
-
-bool ruled_line(const Shape& shape, const SurfacePoint& at, const Vec3& d, double angle, RuledLine* line) {
-  return best_line(shape, at, d, angle, false, line);
-}
-
-bool ruled_line_near(const Shape& shape, const SurfacePoint& at, const Vec3& d, double angle,
-                     RuledLine* line) {
-  return best_line(shape, at, d, angle, true, line);
 }
 
 SupportSet support_set(const Shape& shape, const Vec3& d, double tolerance) {
@@ -158,7 +144,7 @@ SupportSet support_set(const Shape& shape, const Vec3& d, double tolerance) {
   return set;
 }
 
-double feature_lag(const Shape& shape, const Vec3& d, const Support& support) {
+double feature_lag(const Shape& shape, const Vec3& d, double h, const SurfacePoint& where) {
   const FlatFeatures& flats = shape.flats;
   double highest = -std::numeric_limits<double>::infinity();  // of the features' lowest points
   const int f = nearest_face(flats, d, kFaceCosine);
@@ -171,9 +157,9 @@ double feature_lag(const Shape& shape, const Vec3& d, const Support& support) {
     highest =
         std::max(highest, std::min(d.dot(flats.vertices[edge.ends[0]]), d.dot(flats.vertices[edge.ends[1]])));
   RuledLine line;
-  if (best_line(shape, support.where, d, M_PI / 4, true, &line))
+  if (ruled_line(shape, where, d, M_PI / 4, &line))
     highest = std::max(highest, std::min(d.dot(line.ends[0]), d.dot(line.ends[1])));
-  return support.h - highest;
+  return h - highest;
 }
 
 }  // namespace nurbs

@@ -7,7 +7,6 @@
 #include <limits>
 
 #include "body/flat_faces.h"
-#include "body/ruled_lines.h"
 #include "body/support.h"
 
 namespace nurbs {
@@ -65,6 +64,9 @@ struct ReferencePlane {
     return origin + at[0] * u + at[1] * v + (level + height) * normal;
   }
 };
+ReferencePlane plane_along(const Vec3& origin, const Vec3& normal, const Vec3& u) {
+  return {origin, normal, u, normal.cross(u), 0};
+}
 
 // Points on their way into a polygon: in the plane, and on the incident body.
 struct Candidates {
@@ -77,7 +79,7 @@ struct Candidates {
     on_body[plane.count] = point;
     gap[plane.count] = height;
     id[plane.count] = name;
-    plane.add(at, 0, 0);
+    plane.add(at);
   }
   bool within(double most) const {
     return std::all_of(gap, gap + plane.count, [&](double g) { return g <= most; });
@@ -118,7 +120,7 @@ bool finish(const Candidates& from, double least, const Vec2* centre, ContactPol
   int kept[ConvexPolygon::kMost];
   const int count = thin(from.plane, kContactPoints, 0, kept);
   ConvexPolygon few;
-  for (int i = 0; i < count; ++i) few.add(from.plane.corner[kept[i]], 0, 0);
+  for (int i = 0; i < count; ++i) few.add(from.plane.corner[kept[i]]);
   double weight[ConvexPolygon::kMost];
   corner_weights(few, centre ? *centre : polygon_centroid(from.plane), weight);
   for (int i = 0; i < count; ++i) set_point(from, kept[i], weight[i], out);
@@ -168,11 +170,6 @@ void set_ring(const Shape& shape, int body, int face, ContactPolygon* out) {
   }
 }
 
-double gap_below(const Body& incident, const ReferencePlane& plane) {
-  const double h = find_hull_support(*incident.shape, incident.turned_back(-plane.normal)).h;
-  return plane.normal.dot(incident.frame.x - plane.origin) - incident.frame.scale * h - plane.level;
-}
-
 // One attempt at a pair's polygon with a given face as the reference.
 class FaceContact {
  public:
@@ -186,10 +183,11 @@ class FaceContact {
   // Overlap along the face's normal; where it exceeds `most`, a lower bound above that may be given.
   double depth(double most) const {
     const Shape& shape = *incident_.shape;
-    const Vec3 d = incident_.turned_back(-plane_.normal);
-    const Vec3& node = shape.atlas.point[shape.atlas.nearest(d)];
+    const Vec3& node = shape.atlas.point[shape.atlas.nearest(down())];
     const double least = -plane_.height(incident_.place(node));
-    return least > most ? least : -gap_below(incident_, plane_);
+    if (least > most) return least;
+    const double h = find_hull_support(shape, down()).h;
+    return plane_.level - (plane_.normal.dot(incident_.frame.x - plane_.origin) - incident_.frame.scale * h);
   }
 
   // How far all points of both bodies may go while something of whatever may lie over the reference face is
@@ -202,12 +200,9 @@ class FaceContact {
       least = std::min(least,
                        segment_room({incident_.vertex(edge.ends[0]), incident_.vertex(edge.ends[1])}, most));
     }
-    const Shape& shape = *incident_.shape;
-    if (!(least > 0) || shape.flats.ruling.empty()) return least;
-    const Vec3 d = incident_.turned_back(-plane_.normal);
+    if (!(least > 0)) return 0;
     RuledLine line;
-    const bool any = ruled_line_near(shape, find_hull_support(shape, d).where, d, kLineAngle, &line);
-    return any ? std::min(least, segment_room(line.ends, most)) : least;
+    return incident_line(&line) ? std::min(least, segment_room(line.ends, most)) : least;
   }
 
   // `swallowed`: the reference face lies inside the incident one.
@@ -229,6 +224,9 @@ class FaceContact {
   }
 
  private:
+  // Towards the reference plane, axes of the incident body's shape.
+  Vec3 down() const { return incident_.turned_back(-plane_.normal); }
+
   std::uint32_t crossing(int side_of_reference, int side_of_incident) const {
     return reference_.index == 0 ? crossing_id(side_of_reference, side_of_incident)
                                  : crossing_id(side_of_incident, side_of_reference);
@@ -236,8 +234,7 @@ class FaceContact {
 
   void set_window() {
     window_.count = 0;
-    for (const int v : face_.outline)
-      window_.add(plane_.project(reference_.place(reference_.vertex(v))), 0, 0);
+    for (const int v : face_.outline) window_.add(plane_.project(reference_.place(reference_.vertex(v))));
   }
 
   // The incident face opposite the reference, in the reference plane.
@@ -255,11 +252,11 @@ class FaceContact {
   Opposite opposite() const {
     Opposite o;
     const FlatFeatures& flats = incident_.shape->flats;
-    o.face = nearest_face(flats, incident_.turned_back(-plane_.normal), kFaceCosine);
+    o.face = nearest_face(flats, down(), kFaceCosine);
     if (o.face < 0) return o;
     const FlatFace& face = flats.faces[o.face];
     for (int i = 0; i < static_cast<int>(face.outline.size()); ++i)
-      o.outline.add(plane_.project(incident_.place(incident_.vertex(vertex(face, i)))), 0, 0);
+      o.outline.add(plane_.project(incident_.place(incident_.vertex(vertex(face, i)))));
     o.normal = incident_.turned(face.normal);
     o.level = incident_.frame.scale * face.offset - o.normal.dot(plane_.origin - incident_.frame.x);
     return o;
@@ -271,12 +268,6 @@ class FaceContact {
            plane_.level;
   }
 
-  // How deep a place is inside the reference face.
-  double inside(const ConvexPolygon& polygon, const Vec2& at) const {
-    ConvexPolygon point;
-    point.add(at, 0, 0);
-    return depth_inside(polygon, point);
-  }
   // Of room(): the face opposite is either elsewhere, or has a place over the reference that is high.
   double face_room(const Opposite& o, double most) const {
     if (o.face < 0) return kInfinite;
@@ -292,7 +283,8 @@ class FaceContact {
     for (const double t : {0.0, 0.5, 1.0}) {
       const Vec2 at = middle + t * (other - middle);
       const double high = height(o, at) - most;
-      if (high > best) best = std::max(best, std::min({high, inside(window_, at), inside(o.outline, at)}));
+      if (high > best)
+        best = std::max(best, std::min({high, depth_inside(window_, at), depth_inside(o.outline, at)}));
     }
     return std::max(best, 0.0);
   }
@@ -306,7 +298,7 @@ class FaceContact {
     if (!clip_segment(window_, at_p, at_q, slack_, &part)) return 0;
     for (const double s : {0.1, 0.5, 0.9}) {
       const double t = part.t0 + s * (part.t1 - part.t0), high = gap_p + t * (gap_q - gap_p) - most;
-      if (high > best) best = std::max(best, std::min(high, inside(window_, at_p + t * (at_q - at_p))));
+      if (high > best) best = std::max(best, std::min(high, depth_inside(window_, at_p + t * (at_q - at_p))));
     }
     return std::max(best, 0.0);
   }
@@ -396,10 +388,9 @@ class FaceContact {
 
   // The incident body's ruled line that is deepest.
   bool incident_line(RuledLine* line) const {
-    const Vec3 d = incident_.turned_back(-plane_.normal);
     const Shape& shape = *incident_.shape;
     return !shape.flats.ruling.empty() &&
-           ruled_line(shape, find_hull_support(shape, d).where, d, kLineAngle, line);
+           ruled_line(shape, find_hull_support(shape, down()).where, down(), kLineAngle, line);
   }
 
   bool line_points(double most) {
@@ -460,7 +451,7 @@ struct LinePair {
 LinePair pair_of(const Line& a, const Line& b, const Vec3& d) {
   const Vec3 u = (a.ends[1] - a.ends[0]).normalized();
   const Vec3 normal = (d - d.dot(u) * u).normalized();
-  LinePair lines{a, b, {a.ends[0], normal, u, normal.cross(u), 0}, u.dot(a.ends[1] - a.ends[0]), {}, {}};
+  LinePair lines{a, b, plane_along(a.ends[0], normal, u), u.dot(a.ends[1] - a.ends[0]), {}, {}};
   lines.p = lines.plane.project(b.ends[0]);
   lines.q = lines.plane.project(b.ends[1]);
   return lines;
@@ -472,8 +463,8 @@ bool line_contact(const Body& a, const Body& b, const Vec3& d, double overlap, d
   // Both bodies need a feature that lags no more than that behind their support.
   const auto lag = [](const Body& body, const Vec3& along, const SurfacePoint* start) {
     const Vec3 on_body = body.turned_back(along);
-    return body.frame.scale *
-           feature_lag(*body.shape, on_body, find_hull_support(*body.shape, on_body, start));
+    const Support top = find_hull_support(*body.shape, on_body, start);
+    return body.frame.scale * feature_lag(*body.shape, on_body, top.h, top.where);
   };
   const FlatFeatures &flats_a = a.shape->flats, &flats_b = b.shape->flats;
   *room = kInfinite;
@@ -535,10 +526,7 @@ namespace {
 // How far a body may go before it has a flat feature within reach of a plane, where it has none now. `d`:
 // towards the plane, shape axes.
 double clear_way(const Particle& particle, const Vec3& d, double reach, const SupportSet& point) {
-  Support support;
-  support.where = point.where;
-  support.h = point.h;
-  const double room = feature_lag(*particle.shape, d, support) - reach / particle.scale;
+  const double room = feature_lag(*particle.shape, d, point.h, point.where) - reach / particle.scale;
   return kWayShare * particle.scale * std::clamp(room, 0.0, kMostRoom * particle.shape->bounding_radius);
 }
 
@@ -590,15 +578,12 @@ namespace {
 // What of a feature lies over a region.
 class RegionClip {
  public:
-  RegionClip(const PlaneRegion& region, double size) : region_(region), slack_(kClipSlack * size) {
-    u_ = region.normal.unitOrthogonal();
-    v_ = region.normal.cross(u_);
-  }
-  Vec2 project(const Vec3& x) const { return {u_.dot(x - region_.origin), v_.dot(x - region_.origin)}; }
-  double height(const Vec3& x) const { return region_.normal.dot(x - region_.origin); }
-  Vec3 lift(const Vec2& at, double h) const {
-    return region_.origin + at[0] * u_ + at[1] * v_ + h * region_.normal;
-  }
+  RegionClip(const PlaneRegion& region, double size)
+      : plane(plane_along(region.origin, region.normal, region.normal.unitOrthogonal())),
+        region_(region),
+        slack_(kClipSlack * size) {}
+
+  const ReferencePlane plane;
 
   // Corners of the hull of the part of a polygon; whether it is the whole polygon.
   bool polygon(const ConvexPolygon& subject, std::vector<Vec2>* hull) const {
@@ -634,7 +619,7 @@ class RegionClip {
     double least = kInfinite;
     const std::vector<Vec3>& border = region_.cells->border;
     for (std::size_t k = 0; k + 1 < border.size(); k += 2) {
-      const Vec2 a = project(border[k]), way = project(border[k + 1]) - a;
+      const Vec2 a = plane.project(border[k]), way = plane.project(border[k + 1]) - a;
       for (int i = 0; i < points.count; ++i) {
         const Vec2 x = points.corner[i] - a;
         const double t = std::clamp(x.dot(way) / way.squaredNorm(), 0.0, 1.0);
@@ -651,7 +636,7 @@ class RegionClip {
     for (const int end : region_.cells->ends) {
       ConvexPolygon cell;
       for (int k = first; k < end && cell.count < kOutlinePoints; ++k)
-        cell.add(project(region_.cells->corners[k]), 0, 0);
+        cell.add(plane.project(region_.cells->corners[k]));
       if (polygon_area(cell) < 0) std::reverse(cell.corner, cell.corner + cell.count);
       visit(cell);
       first = end;
@@ -680,7 +665,6 @@ class RegionClip {
 
   const PlaneRegion& region_;
   const double slack_;
-  Vec3 u_, v_;
 };
 
 }  // namespace
@@ -691,19 +675,15 @@ RegionContact make_region_polygon(const Particle& particle, const PlaneRegion& r
   if (clear) *clear = 0;
   const Shape& shape = *particle.shape;
   if (shape.flats.empty()) return RegionContact::point;
-  const BodyFrame body = body_frame(particle);
-  const auto place = [&](const Vec3& s) -> Vec3 { return body.x + body.scale * (body.axes * s); };
-  const auto to_shape = [&](const Vec3& x) -> Vec3 {
-    return body.axes.transpose() * (x - body.x) / body.scale;
-  };
+  const Body body(1, particle, Vec3::Zero());
   const auto placed = [&](double room) {
     out->offset = region.normal.dot(region.origin - frame);
     out->room = room;
-    set_marks(plane_frame(frame), body, out);
+    set_marks(plane_frame(frame), body.frame, out);
     return RegionContact::polygon;
   };
-  const Vec3 d = body.axes.transpose() * -region.normal;
-  const SupportSet set = support_set(shape, d, reach / body.scale);
+  const Vec3 d = body.turned_back(-region.normal);
+  const SupportSet set = support_set(shape, d, reach / body.frame.scale);
   if (set.count < 2) {
     if (clear) *clear = clear_way(particle, d, reach, set);
     return RegionContact::point;
@@ -713,42 +693,41 @@ RegionContact make_region_polygon(const Particle& particle, const PlaneRegion& r
     return placed(room);
   };
   if (!region.cells) return whole(kInfinite);
-  const RegionClip clip(region, body.scale * shape.bounding_radius);
+  const RegionClip clip(region, body.radius());
   Candidates points;
   double size = 0;
   if (set.face >= 0) {
     const FlatFace& face = shape.flats.faces[set.face];
     ConvexPolygon subject;  // clockwise seen from the body's outside
     for (std::size_t i = face.outline.size(); i-- > 0;)
-      subject.add(clip.project(place(shape.flats.vertices[face.outline[i]])), 0, 0);
+      subject.add(clip.plane.project(body.place(body.vertex(face.outline[i]))));
     std::vector<Vec2> hull;
     if (clip.polygon(subject, &hull)) return whole(clip.room(subject));
     if (hull.size() < 2) return RegionContact::clear;
-    const Vec3 normal = body.axes * face.normal;
-    const double level = body.scale * face.offset - normal.dot(region.origin - body.x);
+    const Vec3 normal = body.turned(face.normal);
+    const double level = body.frame.scale * face.offset - normal.dot(region.origin - body.frame.x);
     for (const Vec2& at : hull) {
       if (points.plane.count == ConvexPolygon::kMost) break;
-      const Vec3 flat = clip.lift(at, 0) - region.origin;
+      const Vec3 flat = clip.plane.lift(at, 0) - region.origin;
       const double h = (level - normal.dot(flat)) / normal.dot(region.normal);
-      points.add(at, to_shape(clip.lift(at, h)), h, 0);
+      points.add(at, body.to_shape(clip.plane.lift(at, h)), h, 0);
     }
     for (int i = 0; i < points.plane.count; ++i)
       size = std::max(size, (points.plane.corner[i] - points.plane.corner[0]).norm());
   } else {
-    const Vec3 p = place(set.point[0]), q = place(set.point[1]);
+    const Vec3 p = body.place(set.point[0]), q = body.place(set.point[1]);
     double low = 0, high = 1;
-    if (clip.segment(clip.project(p), clip.project(q), &low, &high)) {
+    if (clip.segment(clip.plane.project(p), clip.plane.project(q), &low, &high)) {
       ConvexPolygon ends;
-      ends.add(clip.project(p), 0, 0);
-      ends.add(clip.project(q), 0, 0);
+      ends.add(clip.plane.project(p));
+      ends.add(clip.plane.project(q));
       return whole(clip.room(ends));
     }
     if (!(high > low)) return RegionContact::clear;
     size = (high - low) * (q - p).norm();
     for (const double t : {low, high}) {
       const Vec3 x = p + t * (q - p);
-      points.add({t, 0}, to_shape(x), clip.height(x), 0);
-      points.plane.corner[points.plane.count - 1] = {t * (q - p).norm(), 0};
+      points.add({t * (q - p).norm(), 0}, body.to_shape(x), clip.plane.height(x), 0);
     }
   }
   if (!finish(points, reach, nullptr, out)) return RegionContact::point;
@@ -765,22 +744,24 @@ bool make_pair_polygon(const Particle& pa, const Particle& pb, const Vec3& norma
   if (clear) *clear = 0;
   if (pa.shape->flats.empty() || pb.shape->flats.empty()) return false;
   const Body a(0, pa, pa.x), b(1, pb, pa.x);
-  const int face_a = nearest_face(a.shape->flats, a.turned_back(normal), kFaceCosine);
-  const int face_b = nearest_face(b.shape->flats, b.turned_back(-normal), kFaceCosine);
-  double depth[2] = {kInfinite, kInfinite};  // along the normals of the two faces
   const double most = overlap + reach;
-  if (face_a >= 0) depth[0] = FaceContact(a, a.shape->flats.faces[face_a], b).depth(most);
-  if (face_b >= 0) depth[1] = FaceContact(b, b.shape->flats.faces[face_b], a).depth(most);
+  const auto contact = [&](int reference, int face) {
+    const Body &owner = reference == 0 ? a : b, &other = reference == 0 ? b : a;
+    return FaceContact(owner, owner.shape->flats.faces[face], other);
+  };
+  const Vec3 towards[2] = {a.turned_back(normal), b.turned_back(-normal)};
+  const int nearest[2] = {nearest_face(a.shape->flats, towards[0], kFaceCosine),
+                          nearest_face(b.shape->flats, towards[1], kFaceCosine)};
+  double depth[2] = {kInfinite, kInfinite};  // along the normals of the two faces
+  for (int k = 0; k < 2; ++k)
+    if (nearest[k] >= 0) depth[k] = contact(k, nearest[k]).depth(most);
   int first = old && old->count > 0 && old->reference == 1 ? 1 : 0;
   if (!(depth[first] <= most) || depth[1 - first] < depth[first] - kReferenceShare * overlap)
     first = 1 - first;
 
-  const auto contact = [&](int reference) {
-    const Body &owner = reference == 0 ? a : b, &other = reference == 0 ? b : a;
-    return FaceContact(owner, owner.shape->flats.faces[reference == 0 ? face_a : face_b], other);
-  };
   const auto attempt = [&](int reference, ContactPolygon* polygon, bool* swallowed) {
-    return depth[reference] <= most && contact(reference).make(overlap, reach, polygon, swallowed);
+    return depth[reference] <= most &&
+           contact(reference, nearest[reference]).make(overlap, reach, polygon, swallowed);
   };
   bool swallowed = false;
   if (attempt(first, out, &swallowed)) {
@@ -795,17 +776,15 @@ bool make_pair_polygon(const Particle& pa, const Particle& pb, const Vec3& norma
   *out = {};
   if (!clear) return false;
   // Other faces may become the nearest ones.
-  const auto keep_off = [&](const Body& owner, const Body& other, const Vec3& d) {
-    for (const FlatFace& face : owner.shape->flats.faces) {
-      if (!(room > 0)) return;
-      if (face.normal.dot(d) < kOtherFaceCosine) continue;
-      FaceContact contact(owner, face, other);
-      const double overlap_of = contact.depth(most);
-      room = std::min(room, overlap_of > most ? overlap_of - most : contact.room(reach - overlap));
+  for (int k = 0; k < 2; ++k) {
+    const std::vector<FlatFace>& faces = (k == 0 ? a : b).shape->flats.faces;
+    for (int face = 0; face < static_cast<int>(faces.size()) && room > 0; ++face) {
+      if (faces[face].normal.dot(towards[k]) < kOtherFaceCosine) continue;
+      FaceContact other = contact(k, face);
+      const double overlap_of = face == nearest[k] ? depth[k] : other.depth(most);
+      room = std::min(room, overlap_of > most ? overlap_of - most : other.room(reach - overlap));
     }
-  };
-  keep_off(a, b, a.turned_back(normal));
-  keep_off(b, a, b.turned_back(-normal));
+  }
   const double smaller = std::min(a.radius(), b.radius()), larger = std::max(a.radius(), b.radius());
   *clear = kWayShare * std::min(room, kMostRoom * smaller) * smaller / larger;
   return false;

@@ -23,27 +23,9 @@ Bracket bracket_along(const PairFrame& pair, const Vec3& d, double upper, const 
                       double rho_b) {
   const Vec3 core = (p.b + rho_b * d) - (p.a - rho_a * d);
   const double slack = pair.scale_a * pair.a->joint_slack + pair.scale_b * pair.b->joint_slack;
-  Bracket bracket;
-  bracket.direction = d;
-  bracket.lower = -upper;
-  bracket.upper = core.dot(d) > 0 ? core.norm() - rho_a - rho_b + slack + kRoundoff * pair.reach : kFarAway;
-  bracket.angle2 = 0;
-  bracket.unique = rho_a + rho_b;
-  return bracket;
-}
-
-// Makes the solution that of a converged search.
-void set_met(const Vec3& d, double gap, const Bracket& bracket, int iterations, const PointPair& points,
-             JointSolution* s) {
-  s->points = points;
-  s->points.na = d;
-  s->points.nb = -d;
-  s->bracket = bracket;
-  s->normal = d;
-  s->gap = std::clamp(gap, bracket.lower, bracket.upper);
-  s->iterations = iterations;
-  s->dented = true;
-  s->converged = true;
+  const double most =
+      core.dot(d) > 0 ? core.norm() - rho_a - rho_b + slack + kRoundoff * pair.reach : kFarAway;
+  return {-upper, most, d, 0, rho_a + rho_b};
 }
 
 // W of a body at a support point, in the basis t, s of the pair frame.
@@ -85,13 +67,12 @@ bool meet_crease(const PairFrame& pair, const Vec3& direction, double tolerance,
   Vec3 d = direction;
   for (int k = 0; k < kWarmIterations; ++k) {
     const Vec3 on_b = pair.direction_on_b(d);
-    const Support sa = find_hull_support(*pair.a, d, &p.on_a, kSupportShare * tolerance / pair.scale_a),
-                  sb = find_hull_support(*pair.b, on_b, &p.on_b, kSupportShare * tolerance / pair.scale_b);
+    const auto [sa, sb] = hull_supports(pair, d, &p.on_a, &p.on_b, tolerance);
     p.a = pair.place_a(sa.point);
     p.b = pair.place_b(sb.point);
     p.on_a = sa.where;
     p.on_b = sb.where;
-    const double upper = pair.scale_a * sa.upper + pair.scale_b * sb.upper - d.dot(pair.offset);
+    const double upper = pair.overlap_along(d, sa.upper, sb.upper);
     const Bracket bracket = bracket_along(pair, d, upper, p, ball(pair, *pair.a, sa, pair.scale_a, d),
                                           ball(pair, *pair.b, sb, pair.scale_b, on_b));
     const Vec3 g = p.a - p.b, t = d.unitOrthogonal(), across = d.cross(t);
@@ -102,7 +83,7 @@ bool meet_crease(const PairFrame& pair, const Vec3& direction, double tolerance,
     if (!(hessian(0, 0) > 0 && det > kSingular * hessian(0, 0) * hessian(1, 1))) return false;
     const Vec2 step = -hessian.inverse() * Vec2(t.dot(g), across.dot(g));
     if (bracket.width() <= tolerance && step.norm() <= tilt) {
-      set_met(d, -d.dot(g), bracket, s->iterations + k + 1, p, s);
+      s->set_met(p, bracket, k + 1);
       return true;
     }
     if (!(step.norm() <= kNormalTrust)) return false;
@@ -171,7 +152,7 @@ bool meet_bridge(const PairFrame& pair, const Vec3& direction, double tolerance,
       points.on_b = at.of_a ? at.one.where : nearer.where;
       const Support a = confirm_support(*pair.a, d, points.on_a),
                     b = confirm_support(*pair.b, on_b, points.on_b);
-      const double upper = pair.scale_a * a.upper + pair.scale_b * b.upper - d.dot(pair.offset);
+      const double upper = pair.overlap_along(d, a.upper, b.upper);
       const auto ball_at = [&](const Support& of, bool on_a) {
         return on_a ? ball(pair, *pair.a, of, pair.scale_a, d) : ball(pair, *pair.b, of, pair.scale_b, on_b);
       };
@@ -180,7 +161,7 @@ bool meet_bridge(const PairFrame& pair, const Vec3& direction, double tolerance,
       const Bracket bracket =
           bracket_along(pair, d, upper, points, at.of_a ? rho_two : rho_one, at.of_a ? rho_one : rho_two);
       if (!(bracket.width() <= tolerance)) return false;
-      set_met(d, d.dot(points.b - points.a), bracket, s->iterations + k + 1, points, s);
+      s->set_met(points, bracket, k + 1);
       return true;
     }
     share = next;

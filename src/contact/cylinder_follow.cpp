@@ -71,14 +71,14 @@ class Follower {
         !(left * soft <= tolerance_) || !(0.5 * second <= kLocalDrift * tolerance_ * size_))
       return false;
     set(gap, c, point, Rung::local_model, 0);
-    contact_.where = {static_cast<int>(memory_.on_b.patch), memory_.on_b.u, memory_.on_b.v};
+    contact_.where = surface_point(memory_.on_b);
     return true;
   }
 
   // Newton in the angle of c, by supports: also on creases and corners.
   bool by_supports() {
-    SurfacePoint at{static_cast<int>(memory_.on_b.patch), memory_.on_b.u, memory_.on_b.v};
-    if (at.patch < 0 || at.patch >= static_cast<int>(shape_.patches.size())) return false;
+    SurfacePoint at = surface_point(memory_.on_b);
+    if (!lies_on(shape_, at)) return false;
     if (shape_.support_excess > kSmallDent * tolerance_ * shape_.bounding_radius) return false;
     Vec3 y = pose_.apart + axes_ * (particle_.scale * evaluate0(shape_.patches[at.patch], at.u, at.v));
     y -= y.dot(pose_.axis) * pose_.axis;
@@ -97,7 +97,7 @@ class Follower {
       if (std::abs(step) <= kRingAngle) {
         set(pose_.side * pose_.radius - f, c, point, Rung::warm, k);
         contact_.where = at;
-        memory_.on_b = {static_cast<double>(at.patch), at.u, at.v, {0, 0}};
+        memory_.on_b = point_memory(at);
         store(particle_.q, memory_.proof.q_b);
         drop_model(&memory_.model);
         return true;
@@ -138,7 +138,7 @@ class Follower {
       if (!(step <= kLargestStep)) return false;
       const double chord2 = (c - n).squaredNorm();
       const SurfacePoint next{at.patch, at.u + du, at.v + dv};
-      const bool inside = next.u >= 0 && next.u <= 1 && next.v >= 0 && next.v <= 1;
+      const bool inside = next.on_patch();
       const bool last =
           inside ? step * step <= std::max(tolerance_, kRoundoff) : chord2 <= kRingAngle * kRingAngle;
       if (last && certain(at, n, r, chord2)) {
@@ -185,13 +185,8 @@ class Follower {
     remember_point(at, &memory_.on_b);
     store(particle_.q, memory_.proof.q_b);
     drop_model(&memory_.model);
-    const LocalRate local = local_rate(shape_, particle_.scale, base);
-    if (!may_serve(0, local.rate, 0, turned2_before, gap, tolerance_, size_)) return;
-    scale(particle_.scale, &jet);
-    SupportModel& model = memory_.model.b;
-    if (!make_support_model(Mat3::Identity(), Vec3::Zero(), jet, local, &model)) return;
-    limit_turn(shape_, particle_.scale, kNormalMargin, &model);
-    memory_.model.unique = kCylinderModel;
+    if (make_wall_model(particle_, base, turned2_before, gap, tolerance_, size_, jet, &memory_.model.b))
+      memory_.model.unique = kCylinderModel;
   }
 
   void set(double gap, const Vec3& c, const Vec3& point, Rung rung, int iterations) {
@@ -220,7 +215,7 @@ PairMemory cylinder_memory(const Particle& particle, const SurfacePoint& where) 
   drop_proof(&m.proof);
   drop_model(&m.model);
   m.on_a.patch = -1;
-  m.on_b = {static_cast<double>(where.patch), where.u, where.v, {0, 0}};
+  m.on_b = point_memory(where);
   return m;
 }
 

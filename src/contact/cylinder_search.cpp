@@ -38,15 +38,13 @@ void find_outside(const Particle& particle, const Vec3& origin, const Vec3& axis
 // A body that is a ball, by the line of centres.
 void touch_ball(const Particle& particle, const CylinderPose& pose, SurfaceContacts* out) {
   const double r = particle.scale * roundness(*particle.shape).radius, distance = pose.apart.norm();
-  SurfaceContact c;
+  CylinderContact c;
   c.gap = pose.side * (pose.radius - distance) - r;
   if (!(c.gap < 0)) return;
   c.normal = -pose.side / distance * pose.apart;
   c.on_body = -r * c.normal;
-  c.triangle = 0;
   c.rung = Rung::local_model;
-  c.memory = cylinder_memory(particle, {});
-  out->add(c);
+  out->add(surface_contact(c, cylinder_memory(particle, {})));
 }
 
 }  // namespace

@@ -193,10 +193,7 @@ class DeepSearch {
     if (++supports_ > kMostSupports) return false;
     const Vec3 middle = corners.middle(), d = middle.normalized(), on_b = pair_.direction_on_b(d);
     const Radii r = radii(nearest(inner_a_, d), nearest(inner_b_, on_b), cap_of_depth(cell.depth()));
-    const Support a = find_hull_support(*pair_.a, d, &best_.base_a,
-                                        kSupportShare * tolerance_ / pair_.scale_a),
-                  b = find_hull_support(*pair_.b, on_b, &best_.base_b,
-                                        kSupportShare * tolerance_ / pair_.scale_b);
+    const auto [a, b] = hull_supports(pair_, d, &best_.base_a, &best_.base_b, tolerance_);
     const Vec3 g =
         pair_.place_a(a.point) - r.a * a.normal - pair_.place_b(b.point) + r.b * (pair_.turn * b.normal);
     return corners.above(g, r.level + noise_);

@@ -31,14 +31,15 @@ SurfaceCurvature curvature_at(const Particle& particle, const PointMemory& point
     return {(Mat3::Identity() - outward * outward.transpose()) / (particle.scale * round.radius), true};
   }
   using Slot = JetLanes::Slot;
-  const int patch = static_cast<int>(point.patch);
-  if (patch >= static_cast<int>(particle.shape->patches.size())) return {};
+  const SurfacePoint at = surface_point(point);
+  if (!lies_on(*particle.shape, at)) return {};
+  const BezierPatch& patch = particle.shape->patches[at.patch];
   JetLanes jet;
-  evaluate2(particle.shape->patches[patch], point.u, point.v, &jet);
+  evaluate2(patch, at.u, at.v, &jet);
   const double shortest = std::fmin(jet.at(Slot::kSu).norm(), jet.at(Slot::kSv).norm());
   if (shortest < kBesidePole * particle.shape->bounding_radius) {
     const auto beside = [](double x) { return std::fmin(std::fmax(x, kBesidePole), 1 - kBesidePole); };
-    evaluate2(particle.shape->patches[patch], beside(point.u), beside(point.v), &jet);
+    evaluate2(patch, beside(at.u), beside(at.v), &jet);
   }
   scale(particle.scale, &jet);
   const Vec3 su = jet.at(Slot::kSu), sv = jet.at(Slot::kSv), cross = su.cross(sv);

@@ -27,27 +27,14 @@ bool is_least(const PairFrame& pair, const Vec3& n, double overlap, double m) {
 
 // The overlap along n between a point of A and one of B, at least as deep as the contact's, and at most it
 // plus `excess`.
-bool set_met(const PairFrame& pair, const Vec3& n, const PointPair& points, double excess, double slack,
-             double tolerance, JointSolution* s) {
+bool meet_along(const PairFrame& pair, const Vec3& n, const PointPair& points, double excess, double slack,
+                double tolerance, JointSolution* s) {
   const double gap = n.dot(points.b - points.a);
-  Bracket bracket;
   const double noise = slack + pair.scale_a * pair.a->joint_slack + pair.scale_b * pair.b->joint_slack +
                        kRoundoff * pair.reach;
-  bracket.direction = n;
-  bracket.lower = gap - excess - noise;
-  bracket.upper = gap + noise;
-  bracket.angle2 = 0;
-  bracket.unique = 0;
+  const Bracket bracket{gap - excess - noise, gap + noise, n, 0, 0};
   if (!(bracket.width() <= tolerance)) return false;
-  s->points = points;
-  s->points.na = n;
-  s->points.nb = -n;
-  s->bracket = bracket;
-  s->normal = n;
-  s->gap = gap;
-  s->dented = true;
-  s->converged = true;
-  ++s->iterations;
+  s->set_met(points, bracket, 1);
   return true;
 }
 
@@ -73,10 +60,9 @@ bool meet_face(const PairFrame& pair, const Vec3& direction, int owner, double t
   const Vec3 y = of_a ? pair.place_b(top.point) : pair.place_a(top.point);
   const Vec3 y_on_face = (of_a ? y : Vec3(pair.turn.transpose() * (y - pair.offset))) / scale;
 
-  ConvexPolygon outline, foot;
-  for (const int v : face.outline) outline.add(face.project(flat.flats.vertices[v]), 0, 0);
-  foot.add(face.project(y_on_face), 0, 0);
-  const double inside = scale * depth_inside(outline, foot);
+  ConvexPolygon outline;
+  for (const int v : face.outline) outline.add(face.project(flat.flats.vertices[v]));
+  const double inside = scale * depth_inside(outline, face.project(y_on_face));
   const double overlap = scale * (face.offset - face.normal.dot(y_on_face));
   if (!is_least(pair, n, overlap, inside)) return false;
   const Vec3 x = y + overlap * outward;
@@ -89,7 +75,7 @@ bool meet_face(const PairFrame& pair, const Vec3& direction, int owner, double t
   const SurfacePoint on_face = stays ? last : SurfacePoint{face.patch, 0.5, 0.5};
   points.on_a = of_a ? on_face : top.where;
   points.on_b = of_a ? top.where : on_face;
-  return set_met(pair, n, points, other_scale * (top.upper - top.h), scale * face.slack, tolerance, s);
+  return meet_along(pair, n, points, other_scale * (top.upper - top.h), scale * face.slack, tolerance, s);
 }
 
 // The crease that lies furthest along d, of those about square to it; nullptr without one.
@@ -130,14 +116,12 @@ bool meet_creases(const PairFrame& pair, const Vec3& direction, double tolerance
   points.b = y0 + to_y * v;
   const double overlap = n.dot(points.a - points.b);
   if (!is_least(pair, n, overlap, margin * sine)) return false;
-  const Support a = find_hull_support(*pair.a, n, &s->points.on_a, kSupportShare * tolerance / pair.scale_a),
-                b = find_hull_support(*pair.b, pair.direction_on_b(n), &s->points.on_b,
-                                      kSupportShare * tolerance / pair.scale_b);
+  const auto [a, b] = hull_supports(pair, n, &s->points.on_a, &s->points.on_b, tolerance);
   points.on_a = a.where;
   points.on_b = b.where;
-  const double p = pair.scale_a * a.upper + pair.scale_b * b.upper - n.dot(pair.offset);
-  return set_met(pair, n, points, std::max(0.0, p - overlap),
-                 pair.scale_a * edge_a->slack + pair.scale_b * edge_b->slack, tolerance, s);
+  const double p = pair.overlap_along(n, a.upper, b.upper);
+  return meet_along(pair, n, points, std::max(0.0, p - overlap),
+                    pair.scale_a * edge_a->slack + pair.scale_b * edge_b->slack, tolerance, s);
 }
 
 }  // namespace

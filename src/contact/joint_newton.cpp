@@ -101,16 +101,10 @@ NURBS_INLINE Steps newton_step(const PointPair& p, const JetLanes& ja, const For
   return steps;
 }
 
-NURBS_INLINE bool inside(const SurfacePoint& p, const Vec2& d) {
-  return p.u + d[0] >= 0 && p.u + d[0] <= 1 && p.v + d[1] >= 0 && p.v + d[1] <= 1;
-}
-
 // Parameters after the step, crossing into neighbours where needed; the common case is no crossing.
-NURBS_INLINE SurfacePoint advance(const Shape& shape, SurfacePoint p, const Vec2& d) {
-  if (!inside(p, d)) return walk(shape, p, d[0], d[1]);
-  p.u += d[0];
-  p.v += d[1];
-  return p;
+NURBS_INLINE SurfacePoint advance(const Shape& shape, const SurfacePoint& p, const Vec2& d) {
+  const SurfacePoint next{p.patch, p.u + d[0], p.v + d[1]};
+  return next.on_patch() ? next : walk(shape, p, d[0], d[1]);
 }
 
 // Direction of the normal su x sv; next to a pole, where one of them is mostly round-off, its limit.
@@ -209,6 +203,18 @@ __attribute__((noinline)) void draw_nearer(const PairFrame& pair, const Steps& s
 }
 
 }  // namespace
+
+void JointSolution::set_met(const PointPair& at, const Bracket& along, int solved) {
+  bracket = along;
+  normal = along.direction;
+  points = at;
+  points.na = normal;
+  points.nb = -normal;
+  gap = std::clamp(normal.dot(at.b - at.a), along.lower, along.upper);
+  iterations += solved;
+  dented = true;
+  converged = true;
+}
 
 JointSolution solve_joint(const PairFrame& pair, const SurfacePoint& on_a, const SurfacePoint& on_b,
                           double tolerance, double enough, int cap) {

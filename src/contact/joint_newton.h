@@ -18,6 +18,9 @@ struct JointSolution {
   bool converged =
       false;  // bracket no wider than the tolerance asked for, or the gap proven larger than `enough`
   bool stationary = false;  // a common normal within kStationary, certified or not
+
+  // Converged at points found in another way, after `solved` more systems. Their bracket is along the normal.
+  void set_met(const PointPair& at, const Bracket& along, int solved);
 };
 
 // Solves g.A_u = g.A_v = 0, B_u.n_A = B_v.n_A = 0 with g = A - B and A's unit normal n_A, starting from

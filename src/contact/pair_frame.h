@@ -4,6 +4,7 @@
 
 #include "body/support.h"
 #include "contact/contact.h"
+#include "nurbs/tolerances.h"
 
 namespace nurbs {
 
@@ -31,7 +32,24 @@ struct PairFrame {
   Vec3 direction_on_b(const Vec3& d) const {
     return turn.transpose() * -d;
   }  // the direction B's support is asked for
+
+  // p(d) of support functions' values, shape lengths.
+  double overlap_along(const Vec3& d, double h_a, double h_b) const {
+    return scale_a * h_a + scale_b * h_b - d.dot(offset);
+  }
 };
+
+// Both hulls' supports along unit d, right to kSupportShare of `tolerance` (a length). `on_a`, `on_b`: where
+// the searches begin, or null.
+struct SupportPair {
+  Support a, b;
+};
+inline SupportPair hull_supports(const PairFrame& pair, const Vec3& d, const SurfacePoint* on_a,
+                                 const SurfacePoint* on_b, double tolerance) {
+  const double enough = kSupportShare * tolerance;
+  return {find_hull_support(*pair.a, d, on_a, enough / pair.scale_a),
+          find_hull_support(*pair.b, pair.direction_on_b(d), on_b, enough / pair.scale_b)};
+}
 
 // A pair of surface points with their outward unit normals, in the pair frame.
 struct PointPair {

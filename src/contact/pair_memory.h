@@ -53,23 +53,33 @@ inline void adopt(std::uint64_t stamp, PairMemory* m) {
   drop_model(&m->model);
 }
 
+inline SurfacePoint surface_point(const PointMemory& m) {
+  return {static_cast<int>(m.patch), m.u, m.v};
+}
+inline PointMemory point_memory(const SurfacePoint& at) {
+  return {static_cast<double>(at.patch), at.u, at.v, {0, 0}};
+}
+
+// Whether there is such a point: there is none at first, and a caller's memory may be of another shape.
+inline bool lies_on(const Shape& shape, const SurfacePoint& at) {
+  return at.patch >= 0 && at.patch < static_cast<int>(shape.patches.size());
+}
+
 // Where a surface point would be had it moved on as it last did; if that leaves the patch, where it was.
 inline SurfacePoint warm_point(const PointMemory& m, const Shape& shape) {
-  const int p = static_cast<int>(m.patch);
-  if (p < 0 || p >= static_cast<int>(shape.patches.size())) return {};
-  const double u = m.u + m.step[0], v = m.v + m.step[1];
-  const bool inside = u >= 0 && u <= 1 && v >= 0 && v <= 1;
-  return inside ? SurfacePoint{p, u, v} : SurfacePoint{p, m.u, m.v};
+  const SurfacePoint last = surface_point(m), next{last.patch, m.u + m.step[0], m.v + m.step[1]};
+  if (!lies_on(shape, last)) return {};
+  return next.on_patch() ? next : last;
 }
 inline void remember_point(const SurfacePoint& now, PointMemory* m) {
-  const bool on = m->patch == now.patch;
-  *m = {static_cast<double>(now.patch), now.u, now.v, {on ? now.u - m->u : 0, on ? now.v - m->v : 0}};
+  const PointMemory last = *m;
+  *m = point_memory(now);
+  if (last.patch == m->patch) m->step[0] = m->u - last.u, m->step[1] = m->v - last.v;
 }
 
 inline CoarsePoint coarse(const PointMemory& m) {
   constexpr double kSteps = 65535;
-  const bool there = m.patch >= 0 && m.patch < kSteps && m.u >= 0 && m.u <= 1 && m.v >= 0 && m.v <= 1;
-  if (!there) return {65535, 0, 0};
+  if (!(m.patch >= 0 && m.patch < kSteps && surface_point(m).on_patch())) return {65535, 0, 0};
   const auto step = [](double x) { return static_cast<std::uint16_t>(std::floor(x * kSteps + 0.5)); };
   return {static_cast<std::uint16_t>(m.patch), step(m.u), step(m.v)};
 }
@@ -136,6 +146,18 @@ inline void make_local_model(const ModelSide& a, const ModelSide& b, double uniq
   model->unique = unique;
 }
 
+// The same of one body against a wall; false where it would not serve or there can't be one. `jet`: its jet
+// there in its own axes, shape lengths on entry and the lab's on return.
+inline bool make_wall_model(const Particle& particle, const SurfacePoint& at, double turned2, double gap,
+                            double tolerance, double size, JetLanes& jet, SupportModel* model) {
+  const LocalRate local = local_rate(*particle.shape, particle.scale, at);
+  if (!may_serve(0, local.rate, 0, turned2, gap, tolerance, size)) return false;
+  scale(particle.scale, &jet);
+  if (!make_support_model(Mat3::Identity(), Vec3::Zero(), jet, local, model)) return false;
+  limit_turn(*particle.shape, particle.scale, kNormalMargin, model);
+  return true;
+}
+
 inline void set_local(const LocalContact& c, const Vec3& offset, double reach, ContactResult* r) {
   const double error = c.error + kRoundoff * offset.lpNorm<1>();
   r->rung = Rung::local_model;
@@ -168,6 +190,12 @@ ContactResult solve_plane_contact(const Particle& particle, double height, const
 // Up to round-off. A quaternion that is none, or no number, isn't.
 inline bool is_unit(const Quat& q) {
   return std::abs(q.squaredNorm() - 1) <= kUnitTurn;
+}
+// Drifted quaternions would scale the bodies.
+inline Particle with_unit_turn(const Particle& p) {
+  Particle unit = p;
+  unit.q.normalize();
+  return unit;
 }
 
 inline bool finite(const Particle& p) {

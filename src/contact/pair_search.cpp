@@ -47,13 +47,6 @@ void agree(ContactResult* r) {
   r->point_b += shift;
 }
 
-// Drifted quaternions would scale the bodies.
-Particle with_unit_turn(const Particle& p) {
-  Particle unit = p;
-  unit.q.normalize();
-  return unit;
-}
-
 class Ladder {
  public:
   Ladder(const Particle& a, const Particle& b, const ContactSettings& settings, PairMemory& memory)
@@ -80,11 +73,15 @@ class Ladder {
   }
 
  private:
+  // That the last solve's lower bound was taken along, pair frame. Needs a proof.
+  Vec3 last_direction(const PairFrame& pair) const {
+    return pair.axes_a.transpose() * load(memory_.proof.direction);
+  }
+
   // Rung 2: the atlases along the last separating direction, or along the line of centres.
   bool bounds(const PairFrame& pair, ContactResult* r) {
     if (!std::isfinite(settings_.reach)) return false;
-    const Vec3 d = has_proof(memory_.proof) ? Vec3(pair.axes_a.transpose() * load(memory_.proof.direction))
-                                            : pair.offset.normalized();
+    const Vec3 d = has_proof(memory_.proof) ? last_direction(pair) : pair.offset.normalized();
     const double lower = -atlas_overlap(pair, d);
     if (!set_separated(lower, settings_.reach, Rung::bounds, r)) return false;
     remember_pose(pair, d, lower);
@@ -131,8 +128,7 @@ class Ladder {
     s.iterations = 0;
     s.points.on_a = warm_point(memory_.on_a, *pair.a);
     s.points.on_b = warm_point(memory_.on_b, *pair.b);
-    if (!meet_flat(pair, pair.axes_a.transpose() * load(memory_.proof.direction), tolerance, &s))
-      return false;
+    if (!meet_flat(pair, last_direction(pair), tolerance, &s)) return false;
     *r = finish(pair, s, s.normal, Rung::warm, s.iterations);
     return true;
   }
@@ -144,7 +140,7 @@ class Ladder {
       return false;
     const Support a = confirm_support(*pair.a, s.normal, s.points.on_a),
                   b = confirm_support(*pair.b, pair.direction_on_b(s.normal), s.points.on_b);
-    const double p = pair.scale_a * a.upper + pair.scale_b * b.upper - s.normal.dot(pair.offset);
+    const double p = pair.overlap_along(s.normal, a.upper, b.upper);
     if (-p > s.bracket.lower) {
       s.bracket.lower = -p;
       s.bracket.direction = s.normal;
@@ -158,7 +154,7 @@ class Ladder {
   bool meet_edge(const PairFrame& pair, double tolerance, JointSolution* s) const {
     if (memory_.proof.contact == 0 || !has_proof(memory_.proof) || (pair.a->smooth && pair.b->smooth))
       return false;
-    const Vec3 d = pair.axes_a.transpose() * load(memory_.proof.direction);
+    const Vec3 d = last_direction(pair);
     return meet_bridge(pair, d, tolerance, settings_.tolerance, s) ||
            meet_crease(pair, d, tolerance, settings_.tolerance, s);
   }
@@ -221,12 +217,8 @@ class Ladder {
   // Whether the overlap along a polished normal is that of a gap: of a body next to one much larger, or on a
   // flat, normals may be right to the tolerance of the angle, and the overlap along them not.
   static bool agrees(const PairFrame& pair, const JointSolution& s, double gap, double tolerance) {
-    const double enough = kSupportShare * tolerance;
-    const Support a = find_hull_support(*pair.a, s.normal, &s.points.on_a, enough / pair.scale_a),
-                  b = find_hull_support(*pair.b, pair.direction_on_b(s.normal), &s.points.on_b,
-                                        enough / pair.scale_b);
-    const double p = pair.scale_a * a.h + pair.scale_b * b.h - s.normal.dot(pair.offset);
-    return -p >= gap - kNormalShare * tolerance;
+    const auto [a, b] = hull_supports(pair, s.normal, &s.points.on_a, &s.points.on_b, tolerance);
+    return -pair.overlap_along(s.normal, a.h, b.h) >= gap - kNormalShare * tolerance;
   }
 
   // The polytope brackets the global answer; a stationary point that lies inside its bracket is a better

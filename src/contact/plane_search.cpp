@@ -37,15 +37,15 @@ bool solve_warm(const Shape& shape, const Vec3& d, SurfacePoint at, double toler
     const double det = f[3] * f[5] - f[4] * f[4];
     if (!(f[3] < 0 && det > kSingular * f[3] * f[5])) return false;
     const double r = 1 / det, du = r * (f[4] * f[2] - f[5] * f[1]), dv = r * (f[4] * f[1] - f[3] * f[2]);
-    const double u = at.u + du, v = at.v + dv;
-    if (!(u >= 0 && u <= 1 && v >= 0 && v <= 1)) return false;
+    const SurfacePoint next{at.patch, at.u + du, at.v + dv};
+    if (!next.on_patch()) return false;
     const double excess = support_excess(shape, 1, radii_at(shape, at, nullptr, n), d, n);
     const double roundoff = kRoundoff * shape.bounding_radius;
     if (excess <= tolerance &&
         (d - n).squaredNorm() * shape.bounding_radius <= std::max(tolerance, roundoff)) {
       Support& s = out->support;
       out->base = at;
-      s.where = {at.patch, u, v};
+      s.where = next;
       s.point = taylor(j, du, dv);
       s.h = d.dot(s.point);
       s.upper = f[0] + excess + roundoff;
@@ -53,8 +53,7 @@ bool solve_warm(const Shape& shape, const Vec3& d, SurfacePoint at, double toler
       s.converged = s.h >= f[0] - roundoff && s.h <= s.upper;
       return s.converged;
     }
-    at.u = u;
-    at.v = v;
+    at = next;
   }
   return false;
 }
@@ -144,7 +143,7 @@ class PlaneLadder {
   // The support mapping at large: across patches, from the last point or the atlas.
   void search(ContactResult* r) {
     const bool warm = memory_.on_b.patch >= 0;
-    const SurfacePoint start{static_cast<int>(memory_.on_b.patch), memory_.on_b.u, memory_.on_b.v};
+    const SurfacePoint start = surface_point(memory_.on_b);
     r->rung = warm ? Rung::warm : Rung::cold;
     finish(find_hull_support(shape_, d_, warm ? &start : nullptr), r);
   }
@@ -177,15 +176,11 @@ class PlaneLadder {
   }
 
   // A plane asks one support only: the model needs no uniqueness, but no dents near either.
-  void remember_model(const WarmSupport& s, double turned2_before, double gap) {
-    const LocalRate local = local_rate(shape_, particle_.scale, s.base);
-    if (!may_serve(0, local.rate, 0, turned2_before, gap, settings_.tolerance, radius_)) return;
+  void remember_model(WarmSupport& s, double turned2_before, double gap) {
     if (shape_.dented() && !(shape_.normal_map.radius_at(d_) < kFarAway)) return;
-    JetLanes jet = s.jet;
-    scale(particle_.scale, &jet);
-    SupportModel& model = memory_.model.b;
-    if (!make_support_model(Mat3::Identity(), Vec3::Zero(), jet, local, &model)) return;
-    limit_turn(shape_, particle_.scale, kNormalMargin, &model);
+    if (!make_wall_model(particle_, s.base, turned2_before, gap, settings_.tolerance, radius_, s.jet,
+                         &memory_.model.b))
+      return;
     memory_.model.a = plane_model(normal_);
     memory_.model.unique = kFarAway;
   }
@@ -206,10 +201,8 @@ class PlaneLadder {
 ContactResult find_plane_contact(const Particle& particle, const Vec3& origin, const Vec3& normal,
                                  const ContactSettings& settings, double* memory) {
   if (!is_unit(particle.q)) {
-    Particle unit = particle;
-    unit.q.normalize();
-    if (!is_unit(unit.q)) return ContactResult();
-    return find_plane_contact(unit, origin, normal, settings, memory);
+    const Particle unit = with_unit_turn(particle);
+    return is_unit(unit.q) ? find_plane_contact(unit, origin, normal, settings, memory) : ContactResult();
   }
   PairMemory& m = memory_at(memory);
   adopt(pair_stamp(stamp(normal), stamp(particle), Solver::ladder), &m);

@@ -162,13 +162,9 @@ class Search {
   int query(const Vec3& d, int near) {
     const int v = hull_.points();
     if (v == kHullVertices) return -1;
-    const Vec3 on_b = pair_.direction_on_b(d);
-    const double enough = kSupportShare * tolerance_;
     witness_[v].cap = false;
-    const Support sa = find_hull_support(*pair_.a, d, near < 0 ? nullptr : &witness_[near].on_a,
-                                         enough / pair_.scale_a),
-                  sb = find_hull_support(*pair_.b, on_b, near < 0 ? nullptr : &witness_[near].on_b,
-                                         enough / pair_.scale_b);
+    const auto [sa, sb] = hull_supports(pair_, d, near < 0 ? nullptr : &witness_[near].on_a,
+                                        near < 0 ? nullptr : &witness_[near].on_b, tolerance_);
     Witness& w = witness_[v];
     // The centres of balls that touch there from inside lie in the cores, exactly.
     w.a = pair_.place_a(sa.point) - shrink_a_ * sa.normal;
@@ -176,7 +172,7 @@ class Search {
     w.d = d;
     w.on_a = sa.where;
     w.on_b = sb.where;
-    const double p = pair_.scale_a * sa.upper + pair_.scale_b * sb.upper - d.dot(pair_.offset);
+    const double p = pair_.overlap_along(d, sa.upper, sb.upper);
     w.p = p;
     Vec3 g = w.a - w.b;
     if (joggle_ > 0) g += joggle_ * scatter(g);

@@ -111,7 +111,7 @@ class SurfaceSearch {
   const SurfacePoint* point_for(const Vec3& normal, SurfacePoint* point) const {
     const PairMemory* memory = start_for(normal);
     if (!memory || !(memory->on_b.patch >= 0)) return nullptr;
-    *point = {static_cast<int>(memory->on_b.patch), memory->on_b.u, memory->on_b.v};
+    *point = surface_point(memory->on_b);
     return point;
   }
 
@@ -601,7 +601,7 @@ SurfaceContact surface_contact(const FeatureContact& f, int triangle) {
   drop_proof(&c.memory.proof);
   drop_model(&c.memory.model);
   c.memory.on_a.patch = -1;
-  c.memory.on_b = {static_cast<double>(f.where.patch), f.where.u, f.where.v, {0, 0}};
+  c.memory.on_b = point_memory(f.where);
   c.memory.proof.stamp = 1;
   return c;
 }

@@ -143,6 +143,11 @@ Workspace& workspace() {
   return w;
 }
 
+// Largest curvature radius of a body, its joints left out.
+double flattest_radius(const Particle& particle) {
+  return particle.scale * particle.shape->patch_curvature.max_radius;
+}
+
 class TubeSearch {
  public:
   TubeSearch(const Particle& particle, const CylinderPose& pose, const ContactSettings& settings,
@@ -157,8 +162,17 @@ class TubeSearch {
         out_(*out) {}
 
   bool is_single() const { return distance_ > 0 && !wants_survey(particle_, pose_.radius); }
-  // The one maximum of a body that is more curved than the tube everywhere.
-  double find_one() {
+  // The one maximum of a body that is more curved than the tube everywhere: a former contact's, or looked
+  // for.
+  double find_one(const FormerContact* former, int former_count) {
+    const double flattest = flattest_radius(particle_);
+    Known next;
+    for (int k = 0; k < former_count; ++k) {
+      if (!follow(*former[k].memory, &next)) continue;
+      if (!(pose_.radius - next.contact.gap > flattest)) continue;  // lower, another maximum may be above it
+      add(next);
+      return std::min(next.contact.gap - kSameMaximum * pose_.radius, pose_.radius - flattest);
+    }
     const Reach ahead = tube_.look(0);
     Reach other = ahead;
     const double side = ahead.slope > 0 ? 1 : -1;
@@ -167,19 +181,7 @@ class TubeSearch {
     if (other.slope * side > 0) return 0;
     const Reach top = ahead.slope == 0 ? ahead : side > 0 ? tube_.top(ahead, other) : tube_.top(other, ahead);
     add(known(top));
-    const double flattest = particle_.scale * particle_.shape->patch_curvature.max_radius;
     return pose_.radius - std::max(top.value * (1 + 1e-9), flattest);
-  }
-
-  bool follow(const PairMemory& from, Known* to) const {
-    to->memory = from;
-    if (!follow_on_cylinder(particle_, pose_, settings_, &to->memory, &to->contact)) return false;
-    to->angle = tube_.angle(-to->contact.normal);
-    return true;
-  }
-
-  void add(const Known& k) {
-    if (k.contact.gap < 0) out_.add(surface_contact(k.contact, k.memory));
   }
 
   // Contacts on the whole circle.
@@ -269,6 +271,17 @@ class TubeSearch {
   }
 
  private:
+  bool follow(const PairMemory& from, Known* to) const {
+    to->memory = from;
+    if (!follow_on_cylinder(particle_, pose_, settings_, &to->memory, &to->contact)) return false;
+    to->angle = tube_.angle(-to->contact.normal);
+    return true;
+  }
+
+  void add(const Known& k) {
+    if (k.contact.gap < 0) out_.add(surface_contact(k.contact, k.memory));
+  }
+
   // Maxima as near as kNearestOnWall have F fall by less than twice this between them, for F'' >= -F; so do
   // those that come while F changes by less than this.
   double still_room() const { return std::pow(kNearestOnWall * size_, 2) / (16 * pose_.radius); }
@@ -536,7 +549,7 @@ class TubeSearch {
 }  // namespace
 
 bool wants_survey(const Particle& particle, double radius) {
-  return particle.shape->dented() || !(particle.scale * particle.shape->patch_curvature.max_radius < radius);
+  return particle.shape->dented() || !(flattest_radius(particle) < radius);
 }
 
 SurfaceContact surface_contact(const CylinderContact& contact, const PairMemory& memory) {
@@ -554,17 +567,7 @@ SurfaceContact surface_contact(const CylinderContact& contact, const PairMemory&
 double find_in_tube(const Particle& particle, const CylinderPose& pose, const ContactSettings& settings,
                     const FormerContact* former, int former_count, TubeSurvey* survey, SurfaceContacts* out) {
   TubeSearch search(particle, pose, settings, out);
-  if (search.is_single()) {
-    Known next;
-    for (int k = 0; k < former_count; ++k) {
-      const double flattest = particle.scale * particle.shape->patch_curvature.max_radius;
-      if (!search.follow(*former[k].memory, &next)) continue;
-      if (!(pose.radius - next.contact.gap > flattest)) continue;  // lower, another maximum may be above it
-      search.add(next);
-      return std::min(next.contact.gap - kSameMaximum * pose.radius, pose.radius - flattest);
-    }
-    return search.find_one();
-  }
+  if (search.is_single()) return search.find_one(former, former_count);
   double clear = 0;
   if (survey != nullptr && survey->room > 0) {
     if (search.find_in(*survey, former, former_count, &clear)) return clear;

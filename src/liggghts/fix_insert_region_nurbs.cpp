@@ -25,7 +25,7 @@ void require_room(LAMMPS* lmp, const Fix& fix, const Region& region, double radi
   for (int k = 0; k < 3; ++k)
     if (region.bboxflag && extent[k] < 2 * radius)
       nurbs_host::fail_all(FLERR, lmp,
-                           std::string("Fix ") + fix.style + " " + fix.id + ": region " + region.id + " is " +
+                           nurbs_host::name_of(fix) + ": region " + region.id + " is " +
                                nurbs_host::show(extent[k]) + " long in " + "xyz"[k] +
                                ", too short for all_in yes and particles of bounding diameter " +
                                nurbs_host::show(2 * radius));

@@ -26,6 +26,7 @@ namespace LAMMPS_NS {
 
 using nurbs::Vec3;
 using nurbs_host::fail_all;
+using nurbs_host::name_of;
 using Vec3Map = Eigen::Map<Vec3>;
 
 namespace {
@@ -220,8 +221,7 @@ void FixWallNurbs::init() {
     mesh.fix = dynamic_cast<FixMeshSurface*>(modify->find_fix_id(mesh.id.c_str()));
     if (mesh.fix == nullptr)
       fail_all(FLERR, lmp,
-               std::string("Fix wall/nurbs ") + id + ": its fix mesh/surface " + mesh.id +
-                   " is gone; unfix the wall first");
+               name_of(*this) + ": its fix mesh/surface " + mesh.id + " is gone; unfix the wall first");
   }
   surface_.count_by_triangle(std::any_of(meshes_.begin(), meshes_.end(), [](const Mesh& mesh) {
     return mesh.fix->get_module("stress") != nullptr;
@@ -245,7 +245,7 @@ void FixWallNurbs::warn_models(const PairGranNurbs& pair) {
   }
   if (missing.empty()) return;
   nurbs_host::warn_news(FLERR, lmp,
-                        std::string("Fix wall/nurbs ") + id + " has no " + missing +
+                        name_of(*this) + " has no " + missing +
                             ", which pair_style gran/nurbs has; say it behind the wall's model too, or off",
                         last_model_warning_);
 }
@@ -261,8 +261,7 @@ void FixWallNurbs::warn_periodic() {
   if (directions.empty() || periodic_warned_) return;
   periodic_warned_ = true;
   nurbs_host::warn(FLERR, lmp,
-                   std::string("Fix wall/nurbs ") + id + ": the plane's normal lies along periodic" +
-                       directions +
+                   name_of(*this) + ": the plane's normal lies along periodic" + directions +
                        "; particles that leave there come back behind the plane; use boundary f");
 }
 
@@ -275,9 +274,8 @@ void FixWallNurbs::warn_time_step() {
   if (lightest == 1e300) return;
   const double step = nurbs::resolved_time_step(law_, lightest);
   if (update->dt <= step) return;
-  const std::string warning = std::string("Fix wall/nurbs ") + id + ": time step " +
-                              nurbs_host::show(update->dt) + " does not resolve its contacts; use " +
-                              nurbs_host::show(step) + " or less";
+  const std::string warning = name_of(*this) + ": time step " + nurbs_host::show(update->dt) +
+                              " does not resolve its contacts; use " + nurbs_host::show(step) + " or less";
   nurbs_host::warn_news(FLERR, lmp, warning, last_warning_);
 }
 
@@ -289,13 +287,13 @@ void FixWallNurbs::setup(int vflag) {
 }
 
 void FixWallNurbs::warn_deep(const char* when) {
-  nurbs_host::warn_deep(lmp, stages_.deep(), std::string("Fix wall/nurbs ") + id, when,
+  nurbs_host::warn_deep(lmp, stages_.deep(), name_of(*this), when,
                         "do particles reach through the wall, or is its normal reversed?",
                         last_deep_warning_);
 }
 
 void FixWallNurbs::post_run() {
-  nurbs_host::warn_deep_run(lmp, stages_.deep_in_run(), std::string("Fix wall/nurbs ") + id);
+  nurbs_host::warn_deep_run(lmp, stages_.deep_in_run(), name_of(*this));
 }
 
 void FixWallNurbs::hand_in_neighbours() {
@@ -400,8 +398,8 @@ void FixWallNurbs::check_meshes() {
     MPI_Allreduce(&mine, &first, 1, MPI_INT, MPI_MIN, world);
     if (first != std::numeric_limits<int>::max())
       fail_all(FLERR, lmp,
-               std::string("Fix wall/nurbs ") + id + ": triangle " + std::to_string(first + 1) + " of mesh " +
-                   meshes_[m].id + " has no area");
+               name_of(*this) + ": triangle " + std::to_string(first + 1) + " of mesh " + meshes_[m].id +
+                   " has no area");
   }
 }
 
@@ -622,7 +620,7 @@ void FixWallNurbs::restart(char* buffer) {
   if (was_another_kind_)
     nurbs_host::warn(
         FLERR, lmp,
-        std::string("Fix wall/nurbs ") + id +
+        name_of(*this) +
             ": in the restart, the wall of this ID was of another kind (a plane at rest, or a moving "
             "plane, cylinder or mesh); its contacts begin anew");
   if (kind_ != Kind::mesh && static_cast<double>(kind_) == kept.kind) {
@@ -630,7 +628,7 @@ void FixWallNurbs::restart(char* buffer) {
     const double way = way_since(kept);
     if (way > 1e-9 * edges.norm())
       nurbs_host::warn(FLERR, lmp,
-                       std::string("Fix wall/nurbs ") + id + ": the wall is " + nurbs_host::show(way) +
+                       name_of(*this) + ": the wall is " + nurbs_host::show(way) +
                            " from where it was in the restart; repeat the line it had, 'move ..' included");
   }
   if (comm->me != 0) return;

@@ -45,4 +45,8 @@ std::string show(double value) {
   return text;
 }
 
+std::string name_of(const Fix& fix) {
+  return std::string("Fix ") + fix.style + " " + fix.id;
+}
+
 }  // namespace LAMMPS_NS::nurbs_host

@@ -5,6 +5,10 @@
 
 #include "pointers.h"
 
+namespace LAMMPS_NS {
+class Fix;
+}
+
 namespace LAMMPS_NS::nurbs_host {
 
 // Ends the run on every rank with exit status 1 and one line "ERROR: message". Collective: all ranks must
@@ -23,5 +27,8 @@ void warn_news(const char* file, int line, LAMMPS* lmp, const std::string& messa
 
 // A number as a message shows it: shortest form that tells the value.
 std::string show(double value);
+
+// "Fix STYLE ID", with which messages about a fix begin.
+std::string name_of(const Fix& fix);
 
 }  // namespace LAMMPS_NS::nurbs_host

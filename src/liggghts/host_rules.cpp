@@ -104,9 +104,7 @@ void check_pair_style(LAMMPS* lmp, std::set<std::string>* told) {
 void check_integrator(LAMMPS* lmp, const Fix& fix) {
   if (!fix.time_integrate || std::strcmp(fix.style, "nve/nurbs") == 0 || std::strcmp(fix.style, "move") == 0)
     return;
-  fail_all(FLERR, lmp,
-           std::string("Fix ") + fix.style + " " + fix.id +
-               " would move NURBS particles without turning them; use fix nve/nurbs");
+  fail_all(FLERR, lmp, name_of(fix) + " would move NURBS particles without turning them; use fix nve/nurbs");
 }
 
 // The host inserts when a run begins, after this.
@@ -118,8 +116,8 @@ void check_insertion(LAMMPS* lmp, Fix* fix) {
     const Fix* model = distribution->particletemplates()[n];
     if (dynamic_cast<const FixTemplateNurbs*>(model) == nullptr)
       fail_all(FLERR, lmp,
-               std::string("Fix ") + fix->style + " " + fix->id + ": its template " + model->id + " is of " +
-                   model->style + "; atom_style nurbs needs fix particletemplate/nurbs");
+               name_of(*fix) + ": its template " + model->id + " is of " + model->style +
+                   "; atom_style nurbs needs fix particletemplate/nurbs");
   }
 }
 
@@ -135,9 +133,9 @@ void warn_idle_mesh(LAMMPS* lmp, Fix* fix, std::set<std::string>* told) {
         id.compare(id.size() - ending.size(), ending.size(), ending) == 0)
       return;
   }
-  warn_once(lmp, told,
-            std::string("Fix ") + fix->style + " " + fix->id +
-                " is no wall to the particles: they go through it; name it in fix wall/nurbs mesh");
+  warn_once(
+      lmp, told,
+      name_of(*fix) + " is no wall to the particles: they go through it; name it in fix wall/nurbs mesh");
 }
 
 // The host's fix freeze takes forces and torques off, not the motion that there is: a body may be meant to go
@@ -156,7 +154,7 @@ void warn_frozen_motion(LAMMPS* lmp, const Fix& fix, std::set<std::string>* told
   if (all == 0) return;
   const std::string group = lmp->group->names[fix.igroup];
   warn_once(lmp, told,
-            std::string("Fix freeze ") + fix.id + ": " + std::to_string(all) +
+            name_of(fix) + ": " + std::to_string(all) +
                 " of its particles go on moving as they do; to stop them say 'velocity " + group +
                 " set 0 0 0' and 'set group " + group + " omegax 0 omegay 0 omegaz 0'");
 }
@@ -166,11 +164,10 @@ void check_fix(LAMMPS* lmp, Fix* fix, std::set<std::string>* told) {
   for (const Rule& rule : kSpherical)
     if (starts_with(fix->style, rule.prefix))
       warn_once(lmp, told,
-                std::string("Fix ") + fix->style + " " + fix->id + " goes on with the " + rule.instead +
-                    " of the particles' bounding spheres");
+                name_of(*fix) + " goes on with the " + rule.instead + " of the particles' bounding spheres");
   if (fix->rad_mass_vary_flag)
     fail_all(FLERR, lmp,
-             std::string("Fix ") + fix->style + " " + fix->id +
+             name_of(*fix) +
                  " changes diameters as those of spheres; use 'set group .. nurbs/scale S' between runs");
   warn_idle_mesh(lmp, fix, told);
   warn_frozen_motion(lmp, *fix, told);

@@ -301,7 +301,8 @@ ContactResult find_contact_cso(const Particle& a, const Particle& b, const Conta
   start.on_b = warm_point(m.on_b, *b.shape);
   const ContactResult r = solve_cso(a, b, settings.tolerance, &start);
   const auto keep = [&](const SurfacePoint& at, PointMemory* to) {
-    *to = {start.valid ? static_cast<double>(at.patch) : -1.0, at.u, at.v, {0, 0}};
+    *to = point_memory(at);
+    if (!start.valid) to->patch = -1;
   };
   store(start.direction, m.proof.direction);
   keep(start.on_a, &m.on_a);

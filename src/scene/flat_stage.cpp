@@ -124,7 +124,7 @@ bool ContactStages::make_flat(ContactBlock& block, int lane, const Results& sing
   PointMemory on[2];
   block.get(lane, kLocalModelSize, 10, on);
   SurfacePoint starts[2];
-  for (int k = 0; k < 2; ++k) starts[k] = {static_cast<int>(on[k].patch), on[k].u, on[k].v};
+  for (int k = 0; k < 2; ++k) starts[k] = surface_point(on[k]);
   if (!find_polygon(a, b, normal, overlap, kReach * overlap, nullptr, &polygon, &clear, starts)) {
     block.until[lane] = way + clear;
     return false;

@@ -18,6 +18,13 @@ using namespace nurbs;
 using namespace nurbs::test;
 
 constexpr int kAround = 2048;  // directions sampled
+constexpr double kPath = 5;    // that the body has gone
+
+SurfaceContacts find_from_scratch(const Particle& p, const Vec3& origin, const Vec3& axis, double radius) {
+  SurfaceContacts found;
+  find_cylinder_contacts(p, origin, axis, radius, {}, kPath, nullptr, 0, nullptr, &found);
+  return found;
+}
 
 // The body's reach from the axis along all directions square to it, counted from u.
 std::vector<double> reaches(const Particle& p, const Vec3& origin, const Vec3& u, const Vec3& v) {
@@ -49,18 +56,17 @@ TEST(CylinderSearch, contacts_inside_are_the_maxima_of_the_reach) {
     if (n % 7 == 0) p.x = origin;
     const std::vector<double> f = reaches(p, origin, u, v);
     const double most = *std::max_element(f.begin(), f.end()), coarse = radius * std::pow(M_PI / kAround, 2);
-    SurfaceContacts found;
-    find_cylinder_contacts(p, origin, axis, radius, {}, 5, nullptr, 0, nullptr, &found);
+    const SurfaceContacts found = find_from_scratch(p, origin, axis, radius);
     if (std::abs(most - radius) < 2 * coarse) continue;
     SCOPED_TRACE(shape.name + " " + std::to_string(n));
     ASSERT_EQ(found.count > 0, most > radius);
     if (found.count == 0) {
       ++apart;
-      EXPECT_LE(found.expiry - 5, (1 + 1e-12) * (radius - most));
+      EXPECT_LE(found.expiry - kPath, (1 + 1e-12) * (radius - most));
       const double away = (p.x - origin).cross(axis).norm();
-      if (away + size > radius && found.expiry > 5) {  // no news for the bounding sphere
+      if (away + size > radius && found.expiry > kPath) {  // no news for the bounding sphere
         ++measured;
-        EXPECT_GE(found.expiry - 5, 0.45 * (radius - most) - coarse);
+        EXPECT_GE(found.expiry - kPath, 0.45 * (radius - most) - coarse);
       }
       continue;
     }
@@ -116,13 +122,12 @@ TEST(CylinderSearch, a_round_body_on_the_axis_of_a_narrower_tube_has_one_contact
     p.x = origin + random.uniform(-2, 2) * axis;
     const double reach = -gap_along(p, origin, -axis.unitOrthogonal(), nullptr).gap, radius = 0.97 * reach;
     SCOPED_TRACE(shape.name + " " + std::to_string(n));
-    SurfaceContacts found;
-    find_cylinder_contacts(p, origin, axis, radius, {}, 5, nullptr, 0, nullptr, &found);
+    SurfaceContacts found = find_from_scratch(p, origin, axis, radius);
     ASSERT_EQ(found.count, 1);
     EXPECT_NEAR(found.contact[0].gap, radius - reach, 1e-12 * reach);
     const Vec3 aside = axis.unitOrthogonal();
     p.x += 1e-6 * reach * aside;
-    find_cylinder_contacts(p, origin, axis, radius, {}, 5, nullptr, 0, nullptr, &found);
+    found = find_from_scratch(p, origin, axis, radius);
     ASSERT_EQ(found.count, 1);
     EXPECT_NEAR(found.contact[0].gap, radius - (1 + 1e-6) * reach, 1e-12 * reach);
     EXPECT_NEAR(-found.contact[0].normal.dot(aside), 1, 1e-8);
@@ -141,7 +146,7 @@ class Follower {
     FormerContact former[kSurfaceContacts];
     const int count = last_.count;
     for (int k = 0; k < count; ++k) former[k] = {last_.contact[k].normal, &last_.contact[k].memory, false};
-    find_cylinder_contacts(p, origin, axis, radius, ContactSettings{}, 5, former, count, &survey_, out);
+    find_cylinder_contacts(p, origin, axis, radius, {}, kPath, former, count, &survey_, out);
     kept_ = survey_.room > 0 && survey_.pose.apart != across(p, origin, axis);
     last_ = *out;
   }
@@ -265,9 +270,16 @@ int expect_same(const SurfaceContacts& found, const SurfaceContacts& reference, 
     }
   }
   if (found.count == 0) {
-    EXPECT_LE(found.expiry - 5, (1 + 1e-6) * body.apart());
+    EXPECT_LE(found.expiry - kPath, (1 + 1e-6) * body.apart());
   }
   return merged;
+}
+
+// One step: its contacts, followed, are those from scratch but for so many.
+int step_and_compare(Tumbling& body, Follower& follower, SurfaceContacts* found) {
+  body.step();
+  follower.find(body.p, body.origin, body.axis, body.radius, found);
+  return expect_same(*found, find_from_scratch(body.p, body.origin, body.axis, body.radius), body);
 }
 
 TEST(CylinderSearch, contacts_of_round_bodies_are_followed) {
@@ -279,13 +291,9 @@ TEST(CylinderSearch, contacts_of_round_bodies_are_followed) {
     Tumbling body(random, shape, n % 4 == 3 ? -1 : 1);
     Follower follower;
     for (int k = 0; k < 60; ++k) {
-      body.step();
       SCOPED_TRACE(shape.name + " " + std::to_string(n) + " step " + std::to_string(k));
-      SurfaceContacts found, reference;
-      follower.find(body.p, body.origin, body.axis, body.radius, &found);
-      find_cylinder_contacts(body.p, body.origin, body.axis, body.radius, {}, 5, nullptr, 0, nullptr,
-                             &reference);
-      EXPECT_EQ(expect_same(found, reference, body), 0);
+      SurfaceContacts found;
+      EXPECT_EQ(step_and_compare(body, follower, &found), 0);
       for (int j = 0; j < found.count; ++j) {
         ++touching;
         followed += found.contact[j].iterations > 0;
@@ -317,13 +325,9 @@ TEST(CylinderSearch, contacts_of_bodies_with_flats_are_followed) {
       body.lean(n % 2 ? Vec3::UnitX() : Vec3::UnitZ(), n / 6 % 3 == 1, random.log_uniform(1e-7, 0.1));
     Follower follower;
     for (int k = 0; k < 60; ++k) {
-      body.step();
       SCOPED_TRACE(shape.name + " " + std::to_string(n) + " step " + std::to_string(k));
-      SurfaceContacts found, reference;
-      follower.find(body.p, body.origin, body.axis, body.radius, &found);
-      find_cylinder_contacts(body.p, body.origin, body.axis, body.radius, {}, 5, nullptr, 0, nullptr,
-                             &reference);
-      merged += expect_same(found, reference, body);
+      SurfaceContacts found;
+      merged += step_and_compare(body, follower, &found);
       ++steps;
       touching += found.count > 0;
       several += found.count > 1;
@@ -353,9 +357,9 @@ TEST(CylinderSearch, many_contacts_are_followed) {
       p.x = origin + random.log_uniform(1e-9, 2e-5) * random.direction();
       p.q = (Quat(Eigen::AngleAxisd(random.log_uniform(1e-9, 1e-4), random.direction())) * p.q).normalized();
       SCOPED_TRACE(std::to_string(sides) + " sides, step " + std::to_string(k));
-      SurfaceContacts found, reference;
+      SurfaceContacts found;
       follower.find(p, origin, axis, radius, &found);
-      find_cylinder_contacts(p, origin, axis, radius, {}, 5, nullptr, 0, nullptr, &reference);
+      const SurfaceContacts reference = find_from_scratch(p, origin, axis, radius);
       EXPECT_EQ(found.count, reference.count);
       for (int i = 0; i < std::min(found.count, reference.count); ++i) EXPECT_LT(found.contact[i].gap, 0);
       most = std::max(most, found.count);

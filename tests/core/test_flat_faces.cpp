@@ -234,14 +234,8 @@ ConvexPolygon random_polygon(Random& random, int corners, const Vec2& middle, do
   for (double& a : angle) a = random.uniform(0, 2 * M_PI);
   std::sort(angle.begin(), angle.end());
   ConvexPolygon p;
-  for (const double a : angle) p.add(middle + radius * Vec2(std::cos(a), 0.6 * std::sin(a)), 0, 0);
+  for (const double a : angle) p.add(middle + radius * Vec2(std::cos(a), 0.6 * std::sin(a)));
   return p;
-}
-
-double depth_at(const ConvexPolygon& polygon, const Vec2& at) {
-  ConvexPolygon point;
-  point.add(at, 0, 0);
-  return depth_inside(polygon, point);
 }
 
 TEST(ConvexPolygon, intersection_against_dense_sampling) {
@@ -259,10 +253,10 @@ TEST(ConvexPolygon, intersection_against_dense_sampling) {
     for (int i = 0; i < kGrid; ++i)
       for (int j = 0; j < kGrid; ++j) {
         const Vec2 at(-2 + cell * (i + 0.5), -2 + cell * (j + 0.5));
-        if (depth_at(a, at) < 0 || depth_at(b, at) < 0) continue;
+        if (depth_inside(a, at) < 0 || depth_inside(b, at) < 0) continue;
         area += cell * cell;
         sum += cell * cell * at;
-        EXPECT_TRUE(cut.count == 0 || depth_at(cut, at) >= -1e-12);
+        EXPECT_TRUE(cut.count == 0 || depth_inside(cut, at) >= -1e-12);
       }
     if (cut.count == 0) {
       EXPECT_LT(area, 20 * cell * cell);
@@ -271,6 +265,10 @@ TEST(ConvexPolygon, intersection_against_dense_sampling) {
     ++overlapping;
     EXPECT_NEAR(polygon_area(cut), area, 0.02);
     EXPECT_TRUE(area < 0.1 || (polygon_centroid(cut) - sum / area).norm() < 0.02);
+    double least = HUGE_VAL;
+    for (int i = 0; i < cut.count; ++i) least = std::min(least, depth_inside(b, cut.corner[i]));
+    EXPECT_EQ(depth_inside(b, cut), least);
+    EXPECT_GE(least, -1e-12);
     // Sources: every corner lies on the sides it is said to come from.
     for (int i = 0; i < cut.count; ++i)
       for (const int k : {i, cut.before(i)}) {
@@ -321,14 +319,14 @@ TEST(ConvexPolygon, weights_stand_for_a_uniform_load) {
     EXPECT_LT((centre - moved).norm(), 1e-13);
   }
   ConvexPolygon rectangle;
-  for (const Vec2& c : {Vec2(-3, -1), Vec2(3, -1), Vec2(3, 1), Vec2(-3, 1)}) rectangle.add(c, 0, 0);
+  for (const Vec2& c : {Vec2(-3, -1), Vec2(3, -1), Vec2(3, 1), Vec2(-3, 1)}) rectangle.add(c);
   double w[ConvexPolygon::kMost];
   corner_weights(rectangle, Vec2::Zero(), w);
   for (int i = 0; i < 4; ++i) EXPECT_DOUBLE_EQ(w[i], 0.25);
   // Cutting off a tiny corner shares its weight between the two that replace it.
   ConvexPolygon cut;
   for (const Vec2& c : {Vec2(-3, -1), Vec2(3, -1), Vec2(3, 1 - 1e-7), Vec2(3 - 1e-7, 1), Vec2(-3, 1)})
-    cut.add(c, 0, 0);
+    cut.add(c);
   corner_weights(cut, polygon_centroid(cut), w);
   EXPECT_NEAR(w[2] + w[3], 0.25, 1e-6);
   EXPECT_NEAR(w[0], 0.25, 1e-6);
@@ -336,7 +334,7 @@ TEST(ConvexPolygon, weights_stand_for_a_uniform_load) {
 
 TEST(ConvexPolygon, thinning_keeps_regular_polygons_regular_and_the_lead) {
   ConvexPolygon p;
-  for (int k = 0; k < 32; ++k) p.add(Vec2(std::cos(k * M_PI / 16), std::sin(k * M_PI / 16)), 0, 0);
+  for (int k = 0; k < 32; ++k) p.add(Vec2(std::cos(k * M_PI / 16), std::sin(k * M_PI / 16)));
   for (int lead = 0; lead < 32; ++lead) {
     int kept[ConvexPolygon::kMost];
     ASSERT_EQ(thin(p, 8, lead, kept), 8);
