@@ -56,7 +56,7 @@ constexpr double kReach = 3;  // overlaps by which points of one feature may lag
 constexpr double kKeptReach = 12;     // ... and when a polygon is remade: a leaning body stands on few points
 constexpr double kSlideShare = 1e-3;  // of the polygon's size that cut points may slide before a remake: a
                                       // jump of the torque by 5e-4, of U by 1e-7
-constexpr double kRollShare = 1e-3;   // of the overlap that the points of a ruled line may roll before a remake
+constexpr double kRollShare = 1e-5;   // of the overlap that the points of a ruled line may roll before a remake
 constexpr double kReferenceShare = 0.05;  // of the overlap by which the other face must be the shallower one
                                           // to become the reference
 constexpr double kOutgrownShare = 0.1;    // of the overlap by which the body may be deeper than its points

@@ -27,7 +27,7 @@ neighbor 0.05 bin
 neigh_modify delay 0
 pair_style gran/nurbs
 pair_coeff * * {law}
-fix floor all wall/nurbs plane 0 0 0 0 0 1 {law}
+fix floor all wall/nurbs {wall} {law}
 fix weight all gravity 9.81 vector {gravity}
 fix motion all nve/nurbs
 compute ke all ke
@@ -54,10 +54,16 @@ def turned(axis, degrees):
     return (float(np.cos(half)), *(float(c) for c in np.sin(half) * np.array(axis, float) / np.linalg.norm(axis)))
 
 
-def run(atoms, steps, velocities=(), gravity="0 0 -1", law=LAW, dt=5e-5, every=None, ranks=1, shape=None, before=""):
+def run(atoms, steps, velocities=(), gravity="0 0 -1", law=LAW, dt=5e-5, every=None, ranks=1, shape=None, before="",
+        mesh=None):
     files = {"box.json": shape or deck.shape_file("box", *HALF),
              "bodies.data": deck.data_file(atoms, velocities, ((-3, 3), (-3, 3), (-1, 6)))}
-    return deck.run_ok(DECK.format(shapes="box.json", law=law, gravity=gravity, dt=dt, steps=steps, before=before,
+    wall = "plane 0 0 0 0 0 1"
+    if mesh is not None:
+        files["floor.stl"] = mesh
+        before += "\nfix m all mesh/surface file floor.stl type 1"
+        wall = "mesh m"
+    return deck.run_ok(DECK.format(shapes="box.json", wall=wall, law=law, gravity=gravity, dt=dt, steps=steps, before=before,
                                    every=every or max(1, steps // 20)), files=files, ranks=ranks)
 
 
@@ -98,6 +104,23 @@ class Rest(unittest.TestCase):
                   f" ledger {np.ptp(r.thermo['ledger']) / lost:.1e} of what is dissipated", flush=True)
             self.assertLess(left, 1e-12)
             self.assertLess(np.ptp(r.thermo["ledger"]), 1e-2 * lost)
+
+    def test_a_tablet_with_rounded_rims_lies_still_on_its_band(self):
+        # Leaning, it stands on a rim, beside the band; on a mesh as on a plane.
+        tablet = deck.shape_file("tablet", 0.5, height=0.4, rim=0.05)
+        mass = DENSITY * np.pi * 0.5**2 * 0.4
+        corners = [(-3, -3, 0), (3, -3, 0), (3, 3, 0), (-3, 3, 0)]
+        facets = "".join("facet normal 0 0 1\nouter loop\n" + "".join("vertex %g %g %g\n" % corners[k] for k in t) +
+                         "endloop\nendfacet\n" for t in ((0, 1, 2), (0, 2, 3)))
+        floor = f"solid s\n{facets}endsolid s\n"
+        for lean in (0.1, 0.5, 3):
+            for mesh in (None, floor):
+                r = run([atom(1, (0, 0, 0.51), turned((1, 0, 0), 90 - lean))], 60000, shape=tablet, mesh=mesh)
+                left = r.thermo["kinetic"][-1] / (mass * G * 0.01)
+                print(f"    leaning {lean} degrees on a {'mesh' if mesh else 'plane'}: kinetic energy {left:.1e} of the"
+                      f" fall's, contacts {r.thermo['st[8]'][-1]:.0f}", flush=True)
+                self.assertLess(left, 1e-12)
+                self.assertEqual(r.thermo["st[8]"][-1], 2)
 
     def test_a_dropped_box_lies_still(self):
         for axis, angle in (((1, 0, 0), 0), ((1, 2, 0), 3), ((3, 1, 1), 25)):
@@ -149,7 +172,7 @@ class Heap(unittest.TestCase):
                            ("north", "0 2.5 0 0 -1 0")))
         files = {"box.json": deck.shape_file("box", *HALF), "cylinder.json": cylinder(0.4, 0.3),
                  "bodies.data": deck.data_file(atoms, (), ((-3, 3), (-3, 3), (-1, 8)))}
-        r = deck.run_ok(DECK.format(shapes="box.json cylinder.json", law=LAW, gravity="0 0 -1", dt=5e-5, steps=24000,
+        r = deck.run_ok(DECK.format(shapes="box.json cylinder.json", wall="plane 0 0 0 0 0 1", law=LAW, gravity="0 0 -1", dt=5e-5, steps=24000,
                                     every=1000, before=walls), files=files)
         ledger, lost = r.thermo["ledger"], r.thermo["led[3]"][-1] + r.thermo["led[4]"][-1]
         print(f"    heap: ledger off by {np.ptp(ledger) / lost:.1e} of what is dissipated,"
