@@ -186,9 +186,12 @@ Normal normal_at(const Shape& shape, const Vec3& su, const Vec3& sv) {
   const double least = kPoleSpeed * shape.bounding_radius;
   if (!(area2 > kLeastSine * kLeastSine * product2 && area2 > least * least * least * least))
     return {Vec3::Zero(), std::numeric_limits<double>::infinity()};
-  const double area = std::sqrt(area2), shorter = std::sqrt(std::min(su.squaredNorm(), sv.squaredNorm()));
-  return {cross / area,
-          kNormalNoise * std::sqrt(product2) / area + kTangentNoise * shape.bounding_radius / shorter};
+  const double area = std::sqrt(area2);
+  Normal normal{cross / area, kNormalNoise * std::sqrt(product2) / area};
+  const double shorter2 = std::min(su.squaredNorm(), sv.squaredNorm());
+  if (shorter2 * shorter2 < kNearPole * kNearPole * product2)
+    normal.noise += kTangentNoise * shape.bounding_radius / std::sqrt(shorter2);
+  return normal;
 }
 
 // What h(d) may exceed d . (surface point) by: from the point's normal, as in contact/certificate.h. Infinite
