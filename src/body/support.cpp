@@ -14,7 +14,7 @@
 namespace nurbs {
 namespace {
 
-constexpr double kFanSafety = 1.1;  // sines of slopes stand for angles
+constexpr double kFanSafety = 1.1;               // sines of slopes stand for angles
 constexpr double kTangentNoise = 4 * kRoundoff;  // of the body: round-off of a surface tangent
 
 // The end of edge `edge` in patch parameters, and which parameter is pinned on it.
@@ -174,8 +174,8 @@ Step inward_step(const Model& m, double size, const SurfacePoint& at, bool free_
   return along;
 }
 
-// A surface normal and its error, rad; infinite where it is round-off (poles, collapsed edges). Next to a pole
-// the shorter tangent has the round-off of the longer one.
+// A surface normal and its error, rad; infinite where it is round-off (poles, collapsed edges). Next to a
+// pole the shorter tangent has the round-off of the longer one.
 struct Normal {
   Vec3 n;
   double noise;

@@ -22,7 +22,7 @@ namespace {
 
 constexpr double kGuessAbove = 0.1;    // of the smaller radius: a guess that much above the lowest is none
 constexpr double kSameGuess = 0.9995;  // cosine between refined guesses: the atlases tell no more apart
-constexpr double kNormalShare = 0.5;  // of the tolerance, by which the overlap along a normal may exceed it
+constexpr double kNormalShare = 0.5;   // of the tolerance, by which the overlap along a normal may exceed it
 
 bool set_separated(double lower, double reach, Rung rung, ContactResult* r) {
   if (!(lower > reach)) return false;
@@ -230,9 +230,8 @@ class Ladder {
   }
 
   static const DirectionGuess& lowest_of(const DirectionGuess* guesses, int count) {
-    return *std::min_element(guesses, guesses + count, [](const DirectionGuess& x, const DirectionGuess& y) {
-      return x.p < y.p;
-    });
+    return *std::min_element(guesses, guesses + count,
+                             [](const DirectionGuess& x, const DirectionGuess& y) { return x.p < y.p; });
   }
 
   // Whether an earlier guess leads where guess number k does.

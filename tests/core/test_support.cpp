@@ -92,7 +92,8 @@ TEST(Support, bounds_hold_beside_poles) {
     for (int k = 0; k < 4000; ++k) {
       const double off = random.log_uniform(1e-12, 1e-9);
       const bool top = random.below(2);
-      const SurfacePoint start{random.below(patches), static_cast<double>(random.below(2)), top ? 1 - off : off};
+      const SurfacePoint start{random.below(patches), static_cast<double>(random.below(2)),
+                               top ? 1 - off : off};
       // Tilted squarely to the seam, along which there is then nothing to climb.
       const Vec3 x = evaluate0(shape.patches[start.patch], start.u, 0.5);
       const Vec3 square = axis.cross(x).normalized();

@@ -196,10 +196,11 @@ Body make_further(Random& random, int kind) {
       return searched("rounded profile", revolve(rounded_profile(corners, random.log_uniform(1e-3, 0.2))));
     }
     case 9:
-      return searched("superellipsoid", fitted_superellipsoid(
-                                            Vec3(1, random.uniform(0.3, 1), random.uniform(0.3, 1)),
-                                            random.below(2) ? random.uniform(2.01, 2.4) : random.uniform(8, 12),
-                                            random.whole(3, 5)));
+      return searched(
+          "superellipsoid",
+          fitted_superellipsoid(Vec3(1, random.uniform(0.3, 1), random.uniform(0.3, 1)),
+                                random.below(2) ? random.uniform(2.01, 2.4) : random.uniform(8, 12),
+                                random.whole(3, 5)));
     case 10: {
       const double thin = random.log_uniform(1e-3, 0.05);
       switch (random.below(4)) {

@@ -34,8 +34,8 @@ enum class Kinds {
             // polyhedra, tablets, eggs, bodies of one polar patch; and, with supports that are searched,
             // pebbles, biconvex tablets, kinked and blocky fits
   further,  // linear images of those in closed form, slices of spheres and of ellipsoids, conics of extreme
-            // weights, Reuleaux bodies and prisms, sphericons, polyhedra of many faces or hardly rounded, thin
-            // plates and rods; with searched supports, rounded profiles and fits of other exponents
+            // weights, Reuleaux bodies and prisms, sphericons, polyhedra of many faces or hardly rounded,
+            // thin plates and rods; with searched supports, rounded profiles and fits of other exponents
 };
 
 // Of a seed, made once: `count` bodies, 20 to 100 ms each, of the kinds in turn.
