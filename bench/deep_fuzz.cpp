@@ -1,7 +1,7 @@
 // Random bodies in random poses, most of them deep (tests/support/deep_fuzz.h): how many pairs are left
 // unresolved or answered wrongly, and how long they take.
 //   deep_fuzz [--seed N] [--pairs N] [--bodies N] [--poses NAME,..] [--judge SHARE] [--slow US] [--write DIR]
-//             [--only K]
+//             [--only K] [--kinds first|further]
 // PAIRS (20000) of each kind of pose, of BODIES (96); SHARE (0.1) of the pairs is also compared with a search
 // over directions that shares nothing with the solver, all of them with the overlap along their normal. Pairs
 // that fail or take longer than US (1000) are listed, and written as pair cases (io/pair_case.h) to DIR. Exit
@@ -30,6 +30,7 @@ struct Arguments {
   long pairs = 20000, only = -1;
   int bodies = 96;
   std::string poses, write;
+  Kinds kinds = Kinds::first;
   double judge = 0.1, slow = 1000;
 };
 
@@ -53,6 +54,8 @@ bool read(int argc, char** argv, Arguments* to) {
       to->slow = std::atof(value);
     else if (name == "--write")
       to->write = value;
+    else if (name == "--kinds")
+      to->kinds = std::strcmp(value, "further") == 0 ? Kinds::further : Kinds::first;
     else
       return false;
   }
@@ -108,10 +111,10 @@ int main_program(int argc, char** argv) {
   if (!read(argc, argv, &arguments)) {
     std::fprintf(stderr,
                  "usage: deep_fuzz [--seed N] [--pairs N] [--bodies N] [--poses NAME,..] [--judge SHARE] "
-                 "[--slow US] [--write DIR] [--only K]\n");
+                 "[--slow US] [--write DIR] [--only K] [--kinds first|further]\n");
     return 1;
   }
-  const Fuzz fuzz(arguments.seed, arguments.bodies);
+  const Fuzz fuzz(arguments.seed, arguments.bodies, arguments.kinds);
   std::printf("# %s; seed %llu, %d bodies\n%-9s %8s %8s %6s %6s %6s %9s %8s %8s %8s %8s\n",
               bench::machine_name().c_str(), static_cast<unsigned long long>(arguments.seed),
               arguments.bodies, "pose", "pairs", "judged", "wrong", "unres", "slow", "separated", "us_50",

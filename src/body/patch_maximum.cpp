@@ -419,9 +419,23 @@ class Search {
   Box stack_[kMaximumDepth + 2];  // left uninitialised
 };
 
+// A bilinear patch lies in the hull of its corners, whatever its weights.
+void raise_to_corner(const BezierPatch& patch, int index, const Vec3& d, double slack, Highest* best) {
+  ++best->boxes;
+  for (int k = 0; k < 4; ++k) {
+    const Vec4& p = patch.points[k];
+    const double h = d.dot(p.head<3>()) / p[3];
+    if (!(h > best->h)) continue;
+    best->h = h;
+    best->where = {index, static_cast<double>(k / 2), static_cast<double>(k % 2)};
+  }
+  best->upper = std::max(best->upper, best->h + slack);
+}
+
 }  // namespace
 
 void raise(const BezierPatch& patch, int index, const Vec3& d, double slack, Highest* best) {
+  if (patch.degree_u == 1 && patch.degree_v == 1) return raise_to_corner(patch, index, d, slack, best);
   Search(patch, index, d, slack, best).run();
 }
 

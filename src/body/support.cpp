@@ -14,7 +14,8 @@
 namespace nurbs {
 namespace {
 
-constexpr double kFanSafety = 1.1;  // sines of slopes stand for angles
+constexpr double kFanSafety = 1.1;               // sines of slopes stand for angles
+constexpr double kTangentNoise = 4 * kRoundoff;  // of the body: round-off of a surface tangent
 
 // The end of edge `edge` in patch parameters, and which parameter is pinned on it.
 bool pins_u(int edge) {
@@ -173,7 +174,8 @@ Step inward_step(const Model& m, double size, const SurfacePoint& at, bool free_
   return along;
 }
 
-// A surface normal and its error, rad; infinite where it is round-off (poles, collapsed edges).
+// A surface normal and its error, rad; infinite where it is round-off (poles, collapsed edges). Next to a
+// pole the shorter tangent has the round-off of the longer one.
 struct Normal {
   Vec3 n;
   double noise;
@@ -185,7 +187,11 @@ Normal normal_at(const Shape& shape, const Vec3& su, const Vec3& sv) {
   if (!(area2 > kLeastSine * kLeastSine * product2 && area2 > least * least * least * least))
     return {Vec3::Zero(), std::numeric_limits<double>::infinity()};
   const double area = std::sqrt(area2);
-  return {cross / area, kNormalNoise * std::sqrt(product2) / area};
+  Normal normal{cross / area, kNormalNoise * std::sqrt(product2) / area};
+  const double shorter2 = std::min(su.squaredNorm(), sv.squaredNorm());
+  if (shorter2 * shorter2 < kNearPole * kNearPole * product2)
+    normal.noise += kTangentNoise * shape.bounding_radius / std::sqrt(shorter2);
+  return normal;
 }
 
 // What h(d) may exceed d . (surface point) by: from the point's normal, as in contact/certificate.h. Infinite
@@ -240,7 +246,7 @@ Normal set_point(const Shape& shape, const Vec3& d, const SurfacePoint& at, cons
   const Normal normal = normal_at(shape, su, sv);
   s->where = at;
   s->point = x;
-  s->normal = std::isfinite(normal.noise) ? normal.n : d;
+  s->normal = normal.noise <= kPoleNormal ? normal.n : d;
   s->h = d.dot(x);
   return normal;
 }

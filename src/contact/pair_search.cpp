@@ -20,7 +20,9 @@
 namespace nurbs {
 namespace {
 
-constexpr double kNormalShare = 0.5;  // of the tolerance, by which the overlap along a normal may exceed it
+constexpr double kGuessAbove = 0.1;    // of the smaller radius: a guess that much above the lowest is none
+constexpr double kSameGuess = 0.9995;  // cosine between refined guesses: the atlases tell no more apart
+constexpr double kNormalShare = 0.5;   // of the tolerance, by which the overlap along a normal may exceed it
 
 bool set_separated(double lower, double reach, Rung rung, ContactResult* r) {
   if (!(lower > reach)) return false;
@@ -189,15 +191,20 @@ class Ladder {
   }
 
   // The line of centres leads to most contacts, and the certificate says when it did not: then the basins of
-  // a scan over all directions, the lowest first.
+  // a scan over all directions, the lowest first, each once. Of bodies with creases or flats only the lowest
+  // basin: there Newton seldom finds what it did not at first, and the polytope costs less than a few tries.
   ContactResult cold(const PairFrame& pair, double tolerance, int spent) {
     DirectionGuess guesses[kColdGuesses + 1];
     int found = guess_from_centres(pair, guesses), tried = 0;
     JointSolution best;
     bool have = false;
+    const bool round = pair.a->curvature.min_radius > 0 && pair.b->curvature.min_radius > 0;
     for (bool scanned = false;;) {
+      for (int k = tried; k < found; ++k) guesses[k] = refine_guess(pair, guesses[k]);
+      const double most = lowest_of(guesses, found).p + (round ? kGuessAbove * pair.size : 0);
       for (; tried < found; ++tried) {
-        const JointSolution joint = polish(pair, refine_guess(pair, guesses[tried]), tolerance);
+        if (scanned && (guesses[tried].p > most || is_known(guesses, tried))) continue;
+        const JointSolution joint = polish(pair, guesses[tried], tolerance);
         spent += joint.iterations;
         if (joint.converged) return finish(pair, joint, joint.normal, Rung::cold, spent);
         if (!joint.stationary || (have && joint.gap <= best.gap)) continue;
@@ -209,9 +216,24 @@ class Ladder {
       found += guess_directions(pair, guesses + found, kColdGuesses);
       scanned = true;
     }
-    const auto lowest = std::min_element(
-        guesses, guesses + found, [](const DirectionGuess& x, const DirectionGuess& y) { return x.p < y.p; });
-    return fallback(pair, have ? &best : nullptr, lowest->d, tolerance, spent);
+    const Vec3 seed = lowest_of(guesses, found).d;
+    JointSolution flat;
+    flat.iterations = spent;
+    flat.points.on_a = flat.points.on_b = SurfacePoint{-1, 0, 0};
+    if (meet_flat(pair, seed, tolerance, &flat))
+      return finish(pair, flat, flat.normal, Rung::cold, flat.iterations);
+    return fallback(pair, have ? &best : nullptr, seed, tolerance, spent);
+  }
+
+  static const DirectionGuess& lowest_of(const DirectionGuess* guesses, int count) {
+    return *std::min_element(guesses, guesses + count,
+                             [](const DirectionGuess& x, const DirectionGuess& y) { return x.p < y.p; });
+  }
+
+  // Whether an earlier guess leads where guess number k does.
+  static bool is_known(const DirectionGuess* guesses, int k) {
+    return std::any_of(guesses, guesses + k,
+                       [&](const DirectionGuess& g) { return g.d.dot(guesses[k].d) > kSameGuess; });
   }
 
   // Whether the overlap along a polished normal is that of a gap: of a body next to one much larger, or on a

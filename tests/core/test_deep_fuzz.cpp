@@ -16,26 +16,33 @@ const Fuzz& fuzz() {
   return made;
 }
 
-Judgement answer(Pose pose, long k, bool search) {
-  const families::PairCase c = fuzz().pair(pose, k);
+Judgement answer(const Fuzz& of, Pose pose, long k, bool search) {
+  const families::PairCase c = of.pair(pose, k);
   double memory[kPairMemorySize] = {0};
   ContactSettings settings;
   settings.tolerance = c.tolerance;
   const ContactResult r = find_contact(c.a, c.b, settings, memory);
-  return judge(fuzz(), c, search ? fuzz().truth(c, static_cast<std::uint64_t>(k)) : c.truth, r);
+  return judge(of, c, search ? of.truth(c, static_cast<std::uint64_t>(k)) : c.truth, r);
 }
 
-TEST(DeepFuzz, a_sample_of_every_pose) {
+void expect_sample_right(const Fuzz& of, long pairs) {
   for (int pose = 0; pose < kPoses; ++pose)
-    for (long k = 0; k < 100; ++k) {
-      const Judgement j = answer(static_cast<Pose>(pose), k, k % 25 == 0);
+    for (long k = 0; k < pairs; ++k) {
+      const Judgement j = answer(of, static_cast<Pose>(pose), k, k % 25 == 0);
       EXPECT_STREQ(j.wrong, "") << kPoseNames[pose] << " " << k << ": " << j.error << " of " << j.allowed;
     }
 }
 
+TEST(DeepFuzz, a_sample_of_every_pose) {
+  expect_sample_right(fuzz(), 100);
+}
+TEST(DeepFuzz, a_sample_of_further_bodies) {
+  expect_sample_right(Fuzz(2, 24, Kinds::further), 100);
+}
+
 void expect_right(const std::vector<std::pair<Pose, long>>& pairs) {
   for (const auto& [pose, k] : pairs) {
-    const Judgement j = answer(pose, k, true);
+    const Judgement j = answer(fuzz(), pose, k, true);
     EXPECT_STREQ(j.wrong, "") << kPoseNames[static_cast<int>(pose)] << " " << k << ": " << j.error << " of "
                               << j.allowed;
   }

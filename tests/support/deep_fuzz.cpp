@@ -155,6 +155,74 @@ Body make_body(Random& random, int kind) {
   }
 }
 constexpr int kKinds = 16;
+constexpr int kClosedKinds = 12;  // of them, supports in closed form
+
+Body make_further(Random& random, int kind) {
+  const auto closed = [](Solid solid) { return Body{std::move(solid)}; };
+  const auto image = [&](const Solid& solid, double least) {
+    return Body{test::stretched(random, solid, least)};
+  };
+  switch (kind) {
+    case 0:
+    case 1:
+      return image(make_body(random, random.below(kClosedKinds)).solid, random.log_uniform(0.02, 0.5));
+    case 2: {
+      const double low = random.below(3) ? random.uniform(-1, 0.8) : 0,
+                   high = random.below(3) ? 1 : random.uniform(std::min(0.95, low + 0.05), 1);
+      const Solid segment = test::spherical_segment(random, low, high);
+      return random.below(2) ? closed(segment) : image(segment, 0.1);
+    }
+    case 3:
+      return closed(test::conic_of_revolution(random, random.log_uniform(0.1, 2), random.log_uniform(0.1, 2),
+                                              random.log_uniform(1e-3, 1e3)));
+    case 4:
+      return closed(test::reuleaux_prism(random, random.log_uniform(0.02, 1)));
+    case 5: {
+      const Solid body = random.below(2) ? test::sphericon(random) : test::turned_reuleaux(random);
+      return random.below(2) ? closed(body) : image(body, 0.1);
+    }
+    case 6:
+      return closed(test::polyhedron(random, random.whole(10, 32), random.log_uniform(0.02, 1)));
+    case 7:
+      return closed(rounded_solid(random, random.whole(8, 14), random.log_uniform(1e-4, 0.02)));
+    case 8: {
+      std::vector<Vec2> corners{{0, -random.uniform(0.2, 1)}};
+      const int count = random.whole(1, 4);
+      for (int k = 0; k < count; ++k) {  // on an ellipse: convex
+        const double angle = M_PI * ((k + random.uniform(0.2, 0.8)) / count - 0.5);
+        corners.push_back({std::cos(angle), -corners[0][1] * std::sin(angle)});
+      }
+      corners.push_back({0, -corners[0][1]});
+      return searched("rounded profile", revolve(rounded_profile(corners, random.log_uniform(1e-3, 0.2))));
+    }
+    case 9:
+      return searched(
+          "superellipsoid",
+          fitted_superellipsoid(Vec3(1, random.uniform(0.3, 1), random.uniform(0.3, 1)),
+                                random.below(2) ? random.uniform(2.01, 2.4) : random.uniform(8, 12),
+                                random.whole(3, 5)));
+    case 10: {
+      const double thin = random.log_uniform(1e-3, 0.05);
+      switch (random.below(4)) {
+        case 0:
+          return closed(test::cylinder(random, 1, thin));
+        case 1:
+          return closed(test::cylinder(random, thin, 1));
+        case 2:
+          return closed(test::capsule(random, thin, 1));
+        default: {
+          const Vec3 half(1, random.below(2) ? 1 : thin, thin);
+          return closed(turned_solid(
+              random, "plate", box(half), [=](const Vec3& d) { return test::box_support(d, half, 0); },
+              test::axes_normals()));
+        }
+      }
+    }
+    default:
+      return image(closed(test::polyhedron(random, random.whole(4, 8), 1, 1e3)).solid, 0.2);
+  }
+}
+constexpr int kFurtherKinds = 12;
 
 // --- poses
 // -----------------------------------------------------------------------------------------------------
@@ -251,9 +319,11 @@ void place(const Body& a, const Body& b, Pose pose, Random& random, PairCase* c)
 
 }  // namespace
 
-Fuzz::Fuzz(std::uint64_t seed, int count) : seed_(seed) {
+Fuzz::Fuzz(std::uint64_t seed, int count, Kinds kinds) : seed_(seed) {
   Random random(seed);
-  for (int k = 0; k < count; ++k) bodies_.push_back(make_body(random, k % kKinds));
+  for (int k = 0; k < count; ++k)
+    bodies_.push_back(kinds == Kinds::first ? make_body(random, k % kKinds)
+                                            : make_further(random, k % kFurtherKinds));
 }
 
 const Body& Fuzz::body_of(const Particle& p) const {

@@ -29,12 +29,19 @@ struct Body {
   bool cheap = true;        // a closed form
 };
 
-// Of a seed, made once: `count` bodies, 20 to 100 ms each. Kinds in turn: ellipsoids to 1000 : 1, cones,
-// cylinders, capsules, lenses, polyhedra, boxes, rounded boxes and polyhedra, tablets, eggs, bodies of one
-// polar patch; and those whose supports are searched: pebbles, biconvex tablets, kinked and blocky fits.
+enum class Kinds {
+  first,    // ellipsoids to 1000 : 1, cones, cylinders, capsules, lenses, polyhedra, boxes, rounded boxes and
+            // polyhedra, tablets, eggs, bodies of one polar patch; and, with supports that are searched,
+            // pebbles, biconvex tablets, kinked and blocky fits
+  further,  // linear images of those in closed form, slices of spheres and of ellipsoids, conics of extreme
+            // weights, Reuleaux bodies and prisms, sphericons, polyhedra of many faces or hardly rounded,
+            // thin plates and rods; with searched supports, rounded profiles and fits of other exponents
+};
+
+// Of a seed, made once: `count` bodies, 20 to 100 ms each, of the kinds in turn.
 class Fuzz {
  public:
-  Fuzz(std::uint64_t seed, int count);
+  Fuzz(std::uint64_t seed, int count, Kinds kinds = Kinds::first);
 
   // Pair k of a kind of pose: the same for the same seed and count.
   families::PairCase pair(Pose pose, long k) const;

@@ -145,6 +145,188 @@ Solid lens(Random& random, double bend) {
   return turned_solid(random, "lens", {revolve(profile, 2)}, support, poles());
 }
 
+Solid spherical_segment(Random& random, double low, double high) {
+  const double from = std::asin(low), to = std::asin(high), half = 0.25 * (to - from);
+  const auto at = [&](double angle, double radius, double weight) {
+    return Vec3(std::max(0.0, radius * std::cos(angle)), radius * std::sin(angle), weight);
+  };
+  const double reach = 1 / std::cos(half), w = std::cos(half);
+  std::vector<NurbsSurface> surfaces;
+  if (low > -1) surfaces.push_back(revolve({{0, low, 1}, at(from, 1, 1)}, 1));
+  surfaces.push_back(revolve({at(from, 1, 1), at(from + half, reach, w), at(from + 2 * half, 1, 1),
+                              at(to - half, reach, w), at(to, 1, 1)},
+                             2));
+  if (high < 1) surfaces.push_back(revolve({at(to, 1, 1), {0, high, 1}}, 1));
+  const auto support = [=](const Vec3& d) -> Vec3 {
+    const Vec3 n = d.normalized();
+    const double z = std::clamp(n[2], low, high), across = std::hypot(n[0], n[1]);
+    const double r = std::sqrt(1 - z * z);
+    return across > 0 ? Vec3(r * n[0] / across, r * n[1] / across, z) : Vec3(r, 0, z);
+  };
+  return turned_solid(random, "spherical segment", surfaces, support, poles());
+}
+
+Solid conic_of_revolution(Random& random, double below, double above, double weight) {
+  const Profile profile = {{0, -below, 1}, {1, -below, weight}, {1, 0, 1}, {1, above, weight}, {0, above, 1}};
+  const auto support = [=](const Vec3& d) -> Vec3 {
+    const double a = std::hypot(d[0], d[1]), height = d[2] > 0 ? above : -below, b = std::abs(height * d[2]);
+    // The conic from (0, 1) to (1, 0) is (2 w q + q^2, 1 + 2 w q) / (1 + 2 w q + q^2), its corner (1, 1);
+    // along (a, b) it is highest where b w q^2 - (a - b) q - a w = 0.
+    const double w = weight, c = a - b;
+    double q;
+    const double root = std::sqrt(c * c + 4 * a * b * w * w);
+    if (c > 0)
+      q = b > 0 ? (c + root) / (2 * b * w) : 1e300;
+    else
+      q = root - c > 0 ? 2 * a * w / (root - c) : 0;
+    double r, z;
+    if (q <= 1) {
+      const double whole = 1 + 2 * w * q + q * q;
+      r = (2 * w * q + q * q) / whole;
+      z = (1 + 2 * w * q) / whole;
+    } else {
+      const double k = 1 / q, whole = 1 + 2 * w * k + k * k;
+      r = (2 * w * k + 1) / whole;
+      z = (k * k + 2 * w * k) / whole;
+    }
+    return a > 0 ? Vec3(r * d[0] / a, r * d[1] / a, height * z) : Vec3(0, 0, height);
+  };
+  return turned_solid(random, "conic", {revolve(profile, 2)}, support, poles());
+}
+
+namespace {
+
+constexpr int kSides = 3;
+
+// The Reuleaux triangle of width 1 about the origin: corners, counterclockwise, the first one up.
+Vec2 reuleaux_corner(int k) {
+  const double angle = M_PI * (0.5 + 2.0 / 3 * k);
+  return Vec2(std::cos(angle), std::sin(angle)) / std::sqrt(3.0);
+}
+Vec2 reuleaux_support(const Vec2& d) {
+  const Vec2 n = d.normalized();
+  for (int k = 0; k < kSides; ++k) {  // the arc about a corner faces away from it
+    const Vec2 away = -reuleaux_corner(k).normalized();
+    if (n.dot(away) >= std::cos(M_PI / 6)) return reuleaux_corner(k) + n;
+  }
+  int best = 0;
+  for (int k = 1; k < kSides; ++k)
+    if (n.dot(reuleaux_corner(k)) > n.dot(reuleaux_corner(best))) best = k;
+  return reuleaux_corner(best);
+}
+// Where the end tangents of the arc of 60 degrees about a corner meet.
+Vec2 reuleaux_tangents(int k) {
+  return reuleaux_corner(k) - reuleaux_corner(k).normalized() / std::cos(M_PI / 6);
+}
+
+// A rational quadratic arc, a line of points, from one end to the other: v fastest.
+NurbsSurface ruled(const Vec3 (&low)[3], const Vec3 (&high)[3], double weight) {
+  std::vector<Vec4> net;
+  for (int k = 0; k < 3; ++k) {
+    const double w = k == 1 ? weight : 1;
+    for (const Vec3* x : {&low[k], &high[k]}) net.emplace_back(w * (*x)[0], w * (*x)[1], w * (*x)[2], w);
+  }
+  return bezier_surface(2, 1, std::move(net));
+}
+
+}  // namespace
+
+Solid turned_reuleaux(Random& random) {
+  const double w = std::cos(M_PI / 12), wide = std::cos(M_PI / 6);
+  const Vec2 top = reuleaux_corner(0), right = reuleaux_corner(2);
+  // From the lowest point, below the top, half an arc to the right; then the arc about the left corner.
+  const double half = M_PI / 12;
+  const Vec2 bottom(0, top[1] - 1), turn(std::tan(half), top[1] - 1), corner = reuleaux_tangents(1);
+  std::vector<NurbsSurface> surfaces = {
+      revolve({{bottom[0], bottom[1], 1}, {turn[0], turn[1], w}, {right[0], right[1], 1}}, 2),
+      revolve({{right[0], right[1], 1}, {corner[0], corner[1], wide}, {0, top[1], 1}}, 2)};
+  const auto support = [](const Vec3& d) -> Vec3 {
+    const double across = std::hypot(d[0], d[1]);
+    const Vec2 x = reuleaux_support(Vec2(across, d[2]));
+    return across > 0 ? Vec3(x[0] * d[0] / across, x[0] * d[1] / across, x[1]) : Vec3(0, 0, x[1]);
+  };
+  return turned_solid(random, "turned Reuleaux", surfaces, support, poles());
+}
+
+Solid reuleaux_prism(Random& random, double half) {
+  std::vector<NurbsSurface> surfaces;
+  std::vector<Vec3> normals = poles();
+  const double w = std::cos(M_PI / 6);
+  for (int k = 0; k < kSides; ++k) {
+    const Vec2 arc[3] = {reuleaux_corner((k + 1) % 3), reuleaux_tangents(k), reuleaux_corner((k + 2) % 3)};
+    Vec3 low[3], high[3];
+    const Vec3 bottom[3] = {{0, 0, -half}, {0, 0, -half}, {0, 0, -half}},
+               top[3] = {{0, 0, half}, {0, 0, half}, {0, 0, half}};
+    for (int i = 0; i < 3; ++i) {
+      low[i] = {arc[i][0], arc[i][1], -half};
+      high[i] = {arc[i][0], arc[i][1], half};
+    }
+    surfaces.push_back(ruled(low, high, w));
+    surfaces.push_back(ruled(high, top, w));
+    surfaces.push_back(ruled(bottom, low, w));
+    const Vec2 n = -reuleaux_corner(k).normalized();
+    normals.emplace_back(n[0], n[1], 0);
+    normals.emplace_back(-n[0], -n[1], 0);
+  }
+  const auto support = [half](const Vec3& d) -> Vec3 {
+    const double z = d[2] < 0 ? -half : half;
+    if (!(std::hypot(d[0], d[1]) > 0)) return Vec3(0, 0, z);
+    const Vec2 x = reuleaux_support(d.head<2>());
+    return Vec3(x[0], x[1], z);
+  };
+  return turned_solid(random, "Reuleaux prism", surfaces, support, normals);
+}
+
+Solid sphericon(Random& random) {
+  // A half circle in z = 0, y <= 0, and the tips of its half of the double cone; the other half is its image.
+  Mat3 other;
+  other << 0, 0, 1, 0, -1, 0, 1, 0, 0;
+  const Vec3 arcs[2][3] = {{{-1, 0, 0}, {-1, -1, 0}, {0, -1, 0}}, {{0, -1, 0}, {1, -1, 0}, {1, 0, 0}}};
+  std::vector<NurbsSurface> surfaces;
+  for (const Mat3& m : {Mat3(Mat3::Identity()), other})
+    for (const auto& arc : arcs) {
+      Vec3 rim[3], up[3], down[3];
+      for (int k = 0; k < 3; ++k) {
+        rim[k] = m * arc[k];
+        up[k] = m * Vec3::UnitZ();
+        down[k] = m * -Vec3::UnitZ();
+      }
+      surfaces.push_back(ruled(rim, up, std::sqrt(0.5)));
+      surfaces.push_back(ruled(down, rim, std::sqrt(0.5)));
+    }
+  const auto half_circle = [](const Vec3& d) -> Vec3 {
+    const double across = std::hypot(d[0], d[1]);
+    if (d[1] < 0 && across > 0) return Vec3(d[0] / across, d[1] / across, 0);
+    return Vec3(sign_of(d[0]), 0, 0);
+  };
+  const auto support = [=](const Vec3& d) -> Vec3 {
+    const Vec3 x = half_circle(d), y = other * half_circle(other.transpose() * d);
+    return d.dot(x) >= d.dot(y) ? x : y;
+  };
+  std::vector<Vec3> normals;
+  for (const double x : {1.0, -1.0})
+    for (const double z : {1.0, -1.0}) normals.push_back(Vec3(x, 0, z).normalized());
+  return turned_solid(random, "sphericon", surfaces, support, normals);
+}
+
+Solid stretched(Random& random, const Solid& solid, double least) {
+  const Mat3 turn = random.turn().toRotationMatrix();
+  Vec3 axes(1, 1, 1);
+  for (int k = 1; k < 3; ++k) axes[k] = random.log_uniform(least, 1);
+  const Mat3 map = axes.asDiagonal() * turn;
+  std::vector<NurbsSurface> surfaces = solid.shape->surfaces;
+  for (NurbsSurface& s : surfaces)
+    for (Vec4& p : s.points) p.head<3>() = (map * p.head<3>()).eval();
+  const Vec3 center = solid.shape->mass.center;
+  const auto support = [map, center, of = solid.support](const Vec3& d) -> Vec3 {
+    return map * (of(map.transpose() * d) + center);
+  };
+  std::vector<Vec3> normals;
+  const Mat3 inverse = map.inverse().transpose();
+  for (const Vec3& n : solid.normals) normals.push_back((inverse * n).normalized());
+  return turned_solid(random, "stretched " + solid.shape->name, std::move(surfaces), support, normals);
+}
+
 Solid polyhedron(Random& random, int points, double squeeze, double weights) {
   std::vector<Vec3> corners;
   for (int k = 0; k < points; ++k)

@@ -45,9 +45,22 @@ Solid frustum(Random& random, double low, double high, double height, double wei
 Solid capsule(Random& random, double radius, double half_length);
 // Two spherical caps of radius `bend` that meet at a crease of radius 1; bend > 1.
 Solid lens(Random& random, double bend);
+// What planes square to z leave of the unit sphere between `low` and `high`, both in [-1, 1].
+Solid spherical_segment(Random& random, double low, double high);
+// Two conics, of rational quadratics whose corners weigh `weight`, from poles at -below and above to a circle
+// of radius 1: nearly cones for small weights, nearly a cylinder for large ones.
+Solid conic_of_revolution(Random& random, double below, double above, double weight);
+// The Reuleaux triangle of width 1, turned about its axis; and the prism over it.
+Solid turned_reuleaux(Random& random);
+Solid reuleaux_prism(Random& random, double half_height);
+// Convex hull of two half circles of radius 1 in planes at right angles: halves of a double cone, one of them
+// turned. Its surface unrolls into a plane.
+Solid sphericon(Random& random);
 // Convex hull of `points` points near a sphere squeezed along one axis, every face one bilinear patch with an
 // edge collapsed to a corner.
 Solid polyhedron(Random& random, int points, double squeeze, double weights = 1);
+// The image of a solid by a random linear map of stretches between `least` and 1, not along its own axes.
+Solid stretched(Random& random, const Solid& solid, double least);
 // An exact ellipsoid of the library's, axes along the file's.
 Solid ellipsoid_solid(const Vec3& axes);
 
