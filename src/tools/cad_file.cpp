@@ -443,7 +443,7 @@ std::string lower_ending(const std::string& file) {
   return ending;
 }
 
-// The shells that free faces make when sewn, closed ones.
+// The closed shells that free faces make when sewn; a face closed by itself, as a sphere is, is one too.
 std::vector<TopoDS_Shape> sew(const std::vector<TopoDS_Shape>& faces) {
   Bnd_Box box;
   for (const TopoDS_Shape& face : faces) BRepBndLib::Add(face, box, false);
@@ -452,8 +452,18 @@ std::vector<TopoDS_Shape> sew(const std::vector<TopoDS_Shape>& faces) {
   for (const TopoDS_Shape& face : faces) sewing.Add(face);
   sewing.Perform();
   std::vector<TopoDS_Shape> shells;
-  for (TopExp_Explorer s(sewing.SewedShape(), TopAbs_SHELL); s.More(); s.Next())
-    if (BRep_Tool::IsClosed(s.Current())) shells.push_back(s.Current());
+  const TopoDS_Shape& sewn = sewing.SewedShape();
+  const auto take = [&](const TopoDS_Shape& shell) {
+    if (BRep_Tool::IsClosed(shell)) shells.push_back(shell);
+  };
+  for (TopExp_Explorer s(sewn, TopAbs_SHELL); s.More(); s.Next()) take(s.Current());
+  for (TopExp_Explorer f(sewn, TopAbs_FACE, TopAbs_SHELL); f.More(); f.Next()) {
+    TopoDS_Shell shell;
+    BRep_Builder builder;
+    builder.MakeShell(shell);
+    builder.Add(shell, f.Current());
+    take(shell);
+  }
   return shells;
 }
 
@@ -474,10 +484,13 @@ std::vector<CadSolid> solids_of(const TopoDS_Shape& content, double scale,
   std::vector<TopoDS_Shape> faces;  // of no solid
   for (TopExp_Explorer f(content, TopAbs_FACE, TopAbs_SOLID); f.More(); f.Next())
     faces.push_back(f.Current());
-  for (CadSolid& solid : out) solid.beside = static_cast<int>(faces.size());
-  if (!out.empty()) return out;
-  if (faces.empty()) throw ShapeError("holds no solid and no face");
-  for (const TopoDS_Shape& shell : sew(faces)) out.push_back(describe(shell, scale));
+  int beside = static_cast<int>(faces.size());
+  if (out.empty()) {
+    if (faces.empty()) throw ShapeError("holds no solid and no face");
+    for (const TopoDS_Shape& shell : sew(faces)) out.push_back(describe(shell, scale));
+    for (const CadSolid& solid : out) beside -= solid.faces;
+  }
+  for (CadSolid& solid : out) solid.beside = beside;
   if (out.empty())
     throw ShapeError("holds no solid, and its " + std::to_string(faces.size()) + " faces enclose none");
   return out;

@@ -210,6 +210,13 @@ class ShapeStep(unittest.TestCase):
         self.assertRegex(done.stderr, "^WARNING: [^\n]*1 face that belongs to no solid is left out\n$")
         self.assertAlmostEqual(self.volume(self.place / "out.json"), 60, delta=1e-9)
 
+    def test_faces_closed_by_themselves_are_solids(self):
+        two, out = deck.ROOT / "tests/cases/cad-sphere-faces.brep", self.place / "out.json"
+        self.refused("has 2 solids", "import", two, "-o", out)
+        for solid in (1, 2):
+            self.assertNotIn("not exact", self.good("import", two, "--solid", solid, "-o", out))
+            self.assertAlmostEqual(self.volume(out) / (36 * math.pi), 1, delta=1e-10)
+
     def test_trimmed_faces_are_fitted_with_their_error_stated(self):
         step, radius, height = Step(), 5.0, 1.0
         step.ball_cut_by(radius, height)

@@ -704,7 +704,8 @@ const Body& grain(int which) {
   options.inward = options.outward = share[which - 2];
   options.least_curvature = 0.05;
   const int spans = 2 * (which - 1);
-  return body = make_body("grain", fit_gauge(4, spans, rough_hull(which, 300, 2 * share[which - 2]), options).surfaces);
+  return body = make_body(
+             "grain", fit_gauge(4, spans, rough_hull(which, 300, 2 * share[which - 2]), options).surfaces);
 }
 PairCase fitted_grains(Random& random, long) {
   const Body &a = grain(random.below(kGrains)), &cube = cuboid(Vec3(1, 0.8, 0.6));
@@ -761,7 +762,8 @@ const std::vector<Family>& all_families() {
        eccentric_deep},
       {"mismatched joints", "patches each with parameters of its own", kMany, mismatched_joints},
       {"rounded digits", "control points of 6 to 12 decimals: joints gape", kSearched, rounded_digits},
-      {"fitted grains", "fits of irregular hulls to 5, 2 and 1 %, shallow and deep", kSearched, fitted_grains},
+      {"fitted grains", "fits of irregular hulls to 5, 2 and 1 %, shallow and deep", kSearched,
+       fitted_grains},
   };
   static const std::vector<Family> all = [] {
     std::vector<Family> joined = ovals;
