@@ -174,8 +174,7 @@ ConvexHull ConvexHull::image(const Mat3& m, const Vec3& shift) const {
 int ConvexHull::support(const Vec3& d, int start) const {
   if (cells_ > 0 && d.squaredNorm() > 0) {
     const CubePoint c = to_cube(d);
-    const int known = near_[static_cast<size_t>((c.face * cells_ + cube_cell(c.a, cells_)) * cells_ +
-                                                cube_cell(c.b, cells_))];
+    const int known = near_[(c.face * cells_ + cube_cell(c.a, cells_)) * cells_ + cube_cell(c.b, cells_)];
     if (d.dot(mesh_.points[known]) > d.dot(mesh_.points[start])) start = known;
   }
   return climb(d, start);
