@@ -3,7 +3,10 @@
 
 #include <Eigen/Dense>
 #include <algorithm>
+#include <cmath>
 #include <cstdio>
+
+#include "body/cube_map.h"
 
 extern "C" {
 #include <libqhull_r/qhull_ra.h>
@@ -15,6 +18,7 @@ namespace {
 constexpr double kFlat = 1e-9;          // of the extent: points this near a plane have no hull
 constexpr double kGjkTolerance = 1e-9;  // of the extent
 constexpr int kGjkIterations = 100;
+constexpr size_t kManyVertices = 300;  // from here on a table of starts pays: a climb crosses half the hull
 
 // Whether points span less than three dimensions: their least extent along any of the principal axes.
 bool is_flat(const std::vector<Vec3>& points) {
@@ -128,9 +132,6 @@ std::vector<Vec3> polar_points(const ConvexHull& hull) {
 ConvexHull::ConvexHull(const std::vector<Vec3>& points) {
   if (is_flat(points)) throw ShapeError("the points lie in a plane: their convex hull has no inside");
   TriangleMesh all{points, hull_triangles(points)};
-  Eigen::AlignedBox3d box;
-  for (const Vec3& p : points) box.extend(p);
-  extent_ = box.diagonal().norm();
   mesh_ = weld(all, 0);
   std::vector<std::vector<int>> beside(mesh_.points.size());
   for (const auto& t : mesh_.triangles)
@@ -145,9 +146,41 @@ ConvexHull::ConvexHull(const std::vector<Vec3>& points) {
     neighbours_.insert(neighbours_.end(), list.begin(), list.end());
     first_.push_back(static_cast<int>(neighbours_.size()));
   }
+  measure();
+}
+
+void ConvexHull::measure() {
+  Eigen::AlignedBox3d box;
+  for (const Vec3& p : mesh_.points) box.extend(p);
+  extent_ = box.diagonal().norm();
+  near_.clear();
+  cells_ = 0;
+  if (mesh_.points.size() < kManyVertices) return;
+  const int cells = static_cast<int>(std::sqrt(static_cast<double>(mesh_.points.size()) / 6));  // one each
+  for (int face = 0; face < 6; ++face)
+    for (int i = 0; i < cells; ++i)
+      for (int j = 0; j < cells; ++j)
+        near_.push_back(climb(cell_middle(face, i, j, cells), near_.empty() ? 0 : near_.back()));
+  cells_ = cells;
+}
+
+ConvexHull ConvexHull::image(const Mat3& m, const Vec3& shift) const {
+  ConvexHull out = *this;
+  for (Vec3& p : out.mesh_.points) p = m * p + shift;
+  out.measure();
+  return out;
 }
 
 int ConvexHull::support(const Vec3& d, int start) const {
+  if (cells_ > 0 && d.squaredNorm() > 0) {
+    const CubePoint c = to_cube(d);
+    const int known = near_[(c.face * cells_ + cube_cell(c.a, cells_)) * cells_ + cube_cell(c.b, cells_)];
+    if (d.dot(mesh_.points[known]) > d.dot(mesh_.points[start])) start = known;
+  }
+  return climb(d, start);
+}
+
+int ConvexHull::climb(const Vec3& d, int start) const {
   int at = start;
   double best = d.dot(mesh_.points[at]);
   for (bool climbs = true; climbs;) {

@@ -23,11 +23,14 @@ class ConvexHull {
   // Of finite points. Throws ShapeError when they lie in a plane, to within 1e-9 of their extent.
   explicit ConvexHull(const std::vector<Vec3>& points);
 
+  // Its image x -> m x + shift, det m > 0: far cheaper than a hull of the image's points.
+  ConvexHull image(const Mat3& m, const Vec3& shift) const;
+
   const TriangleMesh& mesh() const { return mesh_; }  // vertices, and triangles wound outward
   MassProperties properties() const { return mesh_properties(mesh_); }
 
-  // A vertex furthest along d (any length), by climbing from vertex `start` along edges: some steps if the
-  // start is near.
+  // A vertex furthest along d (any length), by climbing along edges from vertex `start`, or, of many, from
+  // the one that a table has for the directions around d: a few steps whatever the start.
   int support(const Vec3& d, int start) const;
 
   // Upper bound of the distance from x to the hull, 0 inside: that to a point of it, found by Gilbert's,
@@ -36,8 +39,13 @@ class ConvexHull {
   double distance(const Vec3& x, double enough, int& start) const;
 
  private:
+  void measure();  // what depends on where the vertices are
+  int climb(const Vec3& d, int start) const;
+
   TriangleMesh mesh_;
   std::vector<int> first_, neighbours_;  // of vertex i: [first_[i], first_[i + 1])
+  std::vector<int> near_;  // by cells of directions (body/cube_map.h): the vertex furthest along their middle
+  int cells_ = 0;          // along the edge of a face of the cube; 0: no table
   double extent_ = 0;
 };
 

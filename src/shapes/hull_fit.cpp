@@ -310,9 +310,7 @@ class HullFitter {
 
   HullFit run() {
     if (options_.spans == 0 && try_sphere()) return best_;
-    std::vector<Vec3> even;
-    for (const Vec3& p : hull_.mesh().points) even.emplace_back(frame_.to * (p - frame_.center));
-    const ConvexHull even_hull(even);
+    const ConvexHull even_hull = hull_.image(frame_.to, -frame_.to * frame_.center);
     const RayTarget target(even_hull);
     const bool any = options_.spans == 0;
     int further = 0;
@@ -623,10 +621,7 @@ HullDistance hull_distance(const Shape& shape, const ConvexHull& hull, double re
 HullFit fit_hull(const ConvexHull& hull, const HullFitOptions& options) {
   const int power = std::ilogb(std::sqrt(2.0) * bounding_radius(hull, hull.properties().center));
   if (power == 0) return HullFitter(hull, options).run();
-  std::vector<Vec3> points;
-  for (const Vec3& p : hull.mesh().points)
-    points.emplace_back(std::ldexp(p[0], -power), std::ldexp(p[1], -power), std::ldexp(p[2], -power));
-  const ConvexHull near_one(points);
+  const ConvexHull near_one = hull.image(std::ldexp(1.0, -power) * Mat3::Identity(), Vec3::Zero());
   HullFit fit = HullFitter(near_one, options).run();
   const double scale = std::ldexp(1.0, power);
   transform(fit.surfaces, scale * Mat3::Identity(), Vec3::Zero());

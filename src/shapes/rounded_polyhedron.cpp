@@ -14,7 +14,8 @@
 namespace nurbs {
 namespace {
 
-constexpr double kSamePlane = 1e-6;  // of normals, and of offsets over the extent
+constexpr double kSamePlane = 1e-6;  // of distances from a plane over the extent
+constexpr double kSameSide = 0.9;    // cosine of normals: narrow triangles within a plane have poor ones
 constexpr double kSamePoint = 1e-9;  // of the extent
 
 // A face of the eroded polyhedron: unit normal and vertices, counterclockwise from outside.
@@ -323,15 +324,28 @@ class Rounder {
 }  // namespace
 
 std::vector<HalfSpace> facets(const ConvexHull& hull, size_t most) {
+  const std::vector<Vec3>& points = hull.mesh().points;
+  const double size = extent(points);
+  struct Facet {
+    Vec3 normal;  // as long as twice the area
+    std::array<int, 3> corners;
+  };
+  std::vector<Facet> facets;
+  for (const auto& t : hull.mesh().triangles) facets.push_back({facet_normal(hull.mesh(), t), t});
+  // The largest first: their normals are what rounded coordinates leave of a face's.
+  std::stable_sort(facets.begin(), facets.end(), [](const Facet& a, const Facet& b) {
+    return a.normal.squaredNorm() > b.normal.squaredNorm();
+  });
   std::vector<HalfSpace> out;
-  const double size = extent(hull.mesh().points);
-  for (const auto& t : hull.mesh().triangles) {
-    const Vec3 n = facet_normal(hull.mesh(), t).normalized();
+  for (const Facet& f : facets) {
+    const Vec3 n = f.normal.normalized();
     if (!n.allFinite()) continue;
     double h = -1e300;
-    for (const int k : t) h = std::max(h, n.dot(hull.mesh().points[k]));
+    for (const int k : f.corners) h = std::max(h, n.dot(points[k]));
     const auto same = [&](const HalfSpace& s) {
-      return (s.normal - n).norm() < kSamePlane && std::abs(s.offset - h) < kSamePlane * size;
+      return s.normal.dot(n) > kSameSide && std::all_of(f.corners.begin(), f.corners.end(), [&](int k) {
+               return std::abs(s.offset - s.normal.dot(points[k])) < kSamePlane * size;
+             });
     };
     if (std::any_of(out.begin(), out.end(), same)) continue;
     if (out.size() == most) return {};

@@ -12,6 +12,7 @@
 #include <BRepLib.hxx>
 #include <BRepMesh_IncrementalMesh.hxx>
 #include <BRepTools.hxx>
+#include <BRepTools_PurgeLocations.hxx>
 #include <BRepTools_WireExplorer.hxx>
 #include <BRep_Builder.hxx>
 #include <BRep_Tool.hxx>
@@ -43,6 +44,7 @@
 #include <TCollection_HAsciiString.hxx>
 #include <TopExp.hxx>
 #include <TopExp_Explorer.hxx>
+#include <TopTools_DataMapOfShapeInteger.hxx>
 #include <TopTools_IndexedDataMapOfShapeListOfShape.hxx>
 #include <TopoDS.hxx>
 #include <TransferBRep.hxx>
@@ -54,14 +56,13 @@
 #include <cmath>
 #include <filesystem>
 #include <fstream>
-#include <map>
 
 namespace nurbs {
 namespace {
 
 constexpr double kOnSide = 1e-6;       // of a face's parameter range: closer to a side of it is on it
 constexpr int kCurveSamples = 8;       // of an edge, to see where it runs
-constexpr double kFlat = 1e-9;         // of a face's size: planar
+constexpr double kFlat = 1e-11;        // of a face's distance from the origin and size: planar
 constexpr double kSew = 1e-6;          // of a body's size: edges closer are one
 constexpr double kLargestTurn = 0.2;   // rad, between the normals of neighbouring triangles
 constexpr double kLeastExtent = 1e-3;  // mm: Open CASCADE takes points within 1e-7 mm for one
@@ -209,6 +210,8 @@ std::optional<RectangularFace> rectangular(const TopoDS_Face& face) {
   std::vector<Edge> edges;
   for (TopExp_Explorer e(face, TopAbs_EDGE); e.More(); e.Next()) {
     const TopoDS_Edge edge = TopoDS::Edge(e.Current());
+    if (edge.Orientation() != TopAbs_FORWARD && edge.Orientation() != TopAbs_REVERSED)
+      continue;  // bounds nothing
     std::vector<gp_Pnt2d> points = parameter_curve(edge, face);
     if (points.empty()) return std::nullopt;
     edges.push_back({edge, std::move(points)});
@@ -260,17 +263,50 @@ std::optional<RectangularFace> rectangular(const TopoDS_Face& face) {
   return out;
 }
 
-bool planar(const TopoDS_Face& face) {
-  const Handle(Geom_Surface) surface = surface_of(face);
-  return surface->IsKind(STANDARD_TYPE(Geom_Plane)) || GeomLib_IsPlanarSurface(surface, kFlat).IsPlanar();
+// Whether all control points lie in the plane of three that span it well. Open CASCADE's own test of splines
+// loses half the digits.
+bool planar(const NurbsSurface& s) {
+  std::vector<Vec3> points;
+  for (const Vec4& p : s.points) points.emplace_back(p.head<3>() / p[3]);
+  const auto farthest = [&](const auto& distance) {
+    return *std::max_element(points.begin(), points.end(),
+                             [&](const Vec3& a, const Vec3& b) { return distance(a) < distance(b); });
+  };
+  const Vec3 a = points[0], b = farthest([&](const Vec3&p) { return (p - a).norm(); });
+  const Vec3 c = farthest([&](const Vec3& p) { return (p - a).cross(b - a).norm(); });
+  const Vec3 normal = (b - a).cross(c - a).normalized();
+  const double size = a.norm() + (b - a).norm();
+  return std::all_of(points.begin(), points.end(),
+                     [&](const Vec3& p) { return std::abs(normal.dot(p - a)) <= kFlat * size; });
 }
 
-using Sides = std::map<const TopoDS_TShape*, Side>;  // of rectangular faces, by the edge that each is
+bool planar(const TopoDS_Face& face) {
+  const Handle(Geom_Surface) surface = surface_of(face);
+  if (surface->IsKind(STANDARD_TYPE(Geom_Plane))) return true;
+  if (surface->IsKind(STANDARD_TYPE(Geom_BSplineSurface)) ||
+      surface->IsKind(STANDARD_TYPE(Geom_BezierSurface)))
+    return planar(patch(GeomConvert::SurfaceToBSplineSurface(surface)));
+  return GeomLib_IsPlanarSurface(surface, kFlat).IsPlanar();
+}
+
+// Sides of rectangular faces, by the edge that each is: one that stands in two places is two.
+struct Sides {
+  TopTools_DataMapOfShapeInteger numbers;
+  std::vector<Side> sides;
+  void add(const TopoDS_Edge& edge, Side side) {
+    numbers.Bind(edge, static_cast<int>(sides.size()));
+    sides.push_back(std::move(side));
+  }
+  const Side* find(const TopoDS_Edge& edge) const {
+    return numbers.IsBound(edge) ? &sides[static_cast<size_t>(numbers.Find(edge))] : nullptr;
+  }
+};
 
 // Patches of a plane face within one outline of straight edges and sides of other patches.
 std::vector<NurbsSurface> plane_patches(const TopoDS_Face& face, const Sides& sides) {
-  int wires = 0;
-  for (TopExp_Explorer w(face, TopAbs_WIRE); w.More(); w.Next()) ++wires;
+  int wires = 0;  // those drawn on a face inside, which bound nothing, don't count
+  for (TopExp_Explorer w(face, TopAbs_WIRE); w.More(); w.Next())
+    wires += w.Current().Orientation() == TopAbs_FORWARD || w.Current().Orientation() == TopAbs_REVERSED;
   if (wires != 1) throw Trimmed{"a plane face has a hole"};
   std::vector<Side> outline;
   std::vector<Vec3> corners;
@@ -285,8 +321,8 @@ std::vector<NurbsSurface> plane_patches(const TopoDS_Face& face, const Sides& si
       curve = Handle(Geom_TrimmedCurve)::DownCast(curve)->BasisCurve();
     const bool line = !curve.IsNull() && curve->IsKind(STANDARD_TYPE(Geom_Line));
     straight_only = straight_only && line;
-    if (const auto at = sides.find(edge.TShape().get()); at != sides.end()) {
-      outline.push_back(at->second);
+    if (const Side* known = sides.find(edge)) {
+      outline.push_back(*known);
     } else if (line) {
       outline.push_back(straight(vector(BRep_Tool::Pnt(TopExp::FirstVertex(edge))),
                                  vector(BRep_Tool::Pnt(TopExp::LastVertex(edge)))));
@@ -318,7 +354,7 @@ std::vector<NurbsSurface> exact_patches(const TopoDS_Shape& shell) {
     if (surface_of(face)->IsKind(STANDARD_TYPE(Geom_Plane))) {
       planes.push_back(face);
     } else if (std::optional<RectangularFace> r = rectangular(face)) {
-      for (const auto& [edge, number] : r->sides) sides[edge.TShape().get()] = side(r->patch, number);
+      for (const auto& [edge, number] : r->sides) sides.add(edge, side(r->patch, number));
       out.push_back(std::move(r->patch));
     } else if (planar(face)) {
       planes.push_back(face);
@@ -407,7 +443,7 @@ std::string lower_ending(const std::string& file) {
   return ending;
 }
 
-// The shells that free faces make when sewn, closed ones.
+// The closed shells that free faces make when sewn; a face closed by itself, as a sphere is, is one too.
 std::vector<TopoDS_Shape> sew(const std::vector<TopoDS_Shape>& faces) {
   Bnd_Box box;
   for (const TopoDS_Shape& face : faces) BRepBndLib::Add(face, box, false);
@@ -416,9 +452,26 @@ std::vector<TopoDS_Shape> sew(const std::vector<TopoDS_Shape>& faces) {
   for (const TopoDS_Shape& face : faces) sewing.Add(face);
   sewing.Perform();
   std::vector<TopoDS_Shape> shells;
-  for (TopExp_Explorer s(sewing.SewedShape(), TopAbs_SHELL); s.More(); s.Next())
-    if (BRep_Tool::IsClosed(s.Current())) shells.push_back(s.Current());
+  const TopoDS_Shape& sewn = sewing.SewedShape();
+  const auto take = [&](const TopoDS_Shape& shell) {
+    if (BRep_Tool::IsClosed(shell)) shells.push_back(shell);
+  };
+  for (TopExp_Explorer s(sewn, TopAbs_SHELL); s.More(); s.Next()) take(s.Current());
+  for (TopExp_Explorer f(sewn, TopAbs_FACE, TopAbs_SHELL); f.More(); f.Next()) {
+    TopoDS_Shell shell;
+    BRep_Builder builder;
+    builder.MakeShell(shell);
+    builder.Add(shell, f.Current());
+    take(shell);
+  }
   return shells;
+}
+
+// Places that scale, which old BREP files have, are no longer allowed: the faces' parameters stay as they
+// were.
+TopoDS_Shape placed_rigidly(const TopoDS_Shape& content) {
+  BRepTools_PurgeLocations places;
+  return places.Perform(content) ? places.GetResult() : content;
 }
 
 std::vector<CadSolid> solids_of(const TopoDS_Shape& content, double scale,
@@ -428,11 +481,16 @@ std::vector<CadSolid> solids_of(const TopoDS_Shape& content, double scale,
     out.push_back(describe(s.Current(), scale));
     out.back().name = name(s.Current());
   }
-  if (!out.empty()) return out;
-  std::vector<TopoDS_Shape> faces;
-  for (TopExp_Explorer f(content, TopAbs_FACE); f.More(); f.Next()) faces.push_back(f.Current());
-  if (faces.empty()) throw ShapeError("holds no solid and no face");
-  for (const TopoDS_Shape& shell : sew(faces)) out.push_back(describe(shell, scale));
+  std::vector<TopoDS_Shape> faces;  // of no solid
+  for (TopExp_Explorer f(content, TopAbs_FACE, TopAbs_SOLID); f.More(); f.Next())
+    faces.push_back(f.Current());
+  int beside = static_cast<int>(faces.size());
+  if (out.empty()) {
+    if (faces.empty()) throw ShapeError("holds no solid and no face");
+    for (const TopoDS_Shape& shell : sew(faces)) out.push_back(describe(shell, scale));
+    for (const CadSolid& solid : out) beside -= solid.faces;
+  }
+  for (CadSolid& solid : out) solid.beside = beside;
   if (out.empty())
     throw ShapeError("holds no solid, and its " + std::to_string(faces.size()) + " faces enclose none");
   return out;
@@ -481,7 +539,7 @@ std::vector<CadSolid> read_brep(const std::string& file, double scale) {
   BRep_Builder builder;
   if (!BRepTools::Read(content, file.c_str(), builder) || content.IsNull())
     throw ShapeError("is damaged: BREP can't be parsed");
-  return solids_of(content, scale, no_name);
+  return solids_of(placed_rigidly(content), scale, no_name);
 }
 
 // --- Shapes to files

@@ -16,7 +16,8 @@ namespace nurbs {
 struct CadSolid {
   std::string name;  // as in the file, may be empty
   int faces = 0, cavities = 0;
-  Vec3 extent;  // of its bounding box
+  int beside = 0;  // faces of the file that belong to no solid, and to none here
+  Vec3 extent;     // of its bounding box
   // Its faces as patches, exactly: those whose outline is a rectangle of parameters as they are, plane ones
   // as a quadrilateral or a fan about a point inside.
   std::optional<std::vector<NurbsSurface>> exact;

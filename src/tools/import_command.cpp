@@ -132,6 +132,11 @@ void import(const Arguments& a) {
   if (solid.cavities > 0)
     print_warnings(
         {a.file + ": " + counted(solid.cavities, "cavity inside is", "cavities inside are") + " left out"});
+  if (solid.beside > 0)
+    print_warnings(
+        {a.file + ": " +
+         counted(solid.beside, "face that belongs to no solid is", "faces that belong to no solid are") +
+         " left out"});
   const std::string why = take_exact(a, solid);
   if (why.empty()) return;
   std::printf("not exact: %s; fitted\n", why.c_str());

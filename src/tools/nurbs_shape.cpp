@@ -637,7 +637,7 @@ void print_mass(const Shape& shape) {
   const MassProperties& m = shape.mass;
   const Mat3& g = shape.gyration;
   std::printf("volume             %.12g\n", m.volume);
-  std::printf("centre of mass     %.6g %.6g %.6g\n", m.center[0], m.center[1], m.center[2]);
+  std::printf("centre of mass     %.12g %.12g %.12g\n", m.center[0], m.center[1], m.center[2]);
   std::printf("inertia / mass     xx %.12g yy %.12g zz %.12g\n", g(0, 0), g(1, 1), g(2, 2));
   std::printf("                   xy %.12g xz %.12g yz %.12g\n", g(0, 1), g(0, 2), g(1, 2));
   const Vec3& p = shape.principal_gyration;

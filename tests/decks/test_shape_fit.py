@@ -193,6 +193,9 @@ class Fit(unittest.TestCase):
                 self.assert_near(plate, tolerance)
                 volume = float(re.search(r"against the mesh: volume ([-+]\S+) %", said)[1])
                 self.assertLess(abs(volume), 2)
+        turned = meshes.turned(points * (500, 500, 0.5), 5)  # what STL's digits leave is plane no longer
+        self.assertIn("polyhedron of 6 faces", self.fit(turned, faces, "--tolerance", "2%"))
+        self.assert_near(turned, 0.02)
 
     def test_needles_and_leaves(self):
         """Thinner than the tolerance by far: the volume is kept all the same."""

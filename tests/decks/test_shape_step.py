@@ -192,6 +192,31 @@ class ShapeStep(unittest.TestCase):
             volume = 0.5 * n * 4 * math.sin(2 * math.pi / n) * 3
             self.assertAlmostEqual(self.volume(out) / volume, 1, delta=1e-10)
 
+    def test_solids_that_say_the_same_otherwise(self):
+        """Files as Open CASCADE's modelling operations write them."""
+        cases = {"extruded-ellipse": 24 * math.pi,  # both ends are one edge, in two places
+                 "scaled-place": 20 * math.pi * 2.5**3,  # a place that scales
+                 "sheared-cylinder": 120 * math.pi,  # plane faces that are splines
+                 "inner-wire": 64}  # a line drawn on a face, which bounds nothing
+        out = self.place / "out.json"
+        for name, volume in cases.items():
+            told = self.good("import", deck.ROOT / f"tests/cases/cad-{name}.brep", "-o", out)
+            self.assertNotIn("not exact", told, name)
+            self.assertAlmostEqual(self.volume(out) / volume, 1, delta=1e-10, msg=name)
+
+    def test_faces_beside_a_solid_are_named(self):
+        done = call("import", deck.ROOT / "tests/cases/cad-loose-face.brep", "-o", self.place / "out.json")
+        self.assertEqual(done.returncode, 0, done.stderr)
+        self.assertRegex(done.stderr, "^WARNING: [^\n]*1 face that belongs to no solid is left out\n$")
+        self.assertAlmostEqual(self.volume(self.place / "out.json"), 60, delta=1e-9)
+
+    def test_faces_closed_by_themselves_are_solids(self):
+        two, out = deck.ROOT / "tests/cases/cad-sphere-faces.brep", self.place / "out.json"
+        self.refused("has 2 solids", "import", two, "-o", out)
+        for solid in (1, 2):
+            self.assertNotIn("not exact", self.good("import", two, "--solid", solid, "-o", out))
+            self.assertAlmostEqual(self.volume(out) / (36 * math.pi), 1, delta=1e-10)
+
     def test_trimmed_faces_are_fitted_with_their_error_stated(self):
         step, radius, height = Step(), 5.0, 1.0
         step.ball_cut_by(radius, height)

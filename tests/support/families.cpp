@@ -13,6 +13,8 @@
 #include "contact/pair_memory.h"
 #include "contact/pair_search.h"
 #include "nurbs/tolerances.h"
+#include "shapes/gauge_fit.h"
+#include "shapes/hull_fit.h"
 #include "shapes/primitives.h"
 #include "shapes/revolved.h"
 #include "support/as_surface.h"
@@ -674,6 +676,59 @@ PairCase rounded_digits(Random& random, long) {
   return imperfect(random, a, b);
 }
 
+// The hull of points off an ellipsoid by up to `rough`, about 1 in size, round the origin.
+ConvexHull rough_hull(unsigned seed, int count, double rough) {
+  Random random(seed);
+  const Vec3 axes(random.uniform(0.9, 1.5), 1, random.uniform(0.6, 1));
+  std::vector<Vec3> points;
+  for (int k = 0; k < count; ++k)
+    points.push_back(random.uniform(1 - rough, 1) * axes.cwiseProduct(random.direction()));
+  return ConvexHull(points);
+}
+
+// What `nurbs-shape fit` makes of irregular hulls: polynomial patches, and rational ones of 2, 4 and 6 spans
+// of a gauge function, to 5, 5, 2 and 1 %.
+constexpr int kGrains = 5;
+const Body& grain(int which) {
+  static Body made[kGrains];
+  Body& body = made[which];
+  if (body.shape) return body;
+  if (which < 2) {
+    HullFitOptions options;
+    options.tolerance = 0.05;
+    options.spans = 1;
+    return body = {fit_hull(rough_hull(which, 200, 0.1), options).shape};
+  }
+  GaugeFitOptions options;
+  const double share[] = {0.05, 0.02, 0.01};
+  options.inward = options.outward = share[which - 2];
+  options.least_curvature = 0.05;
+  const int spans = 2 * (which - 1);
+  return body = make_body(
+             "grain", fit_gauge(4, spans, rough_hull(which, 300, 2 * share[which - 2]), options).surfaces);
+}
+PairCase fitted_grains(Random& random, long) {
+  const Body &a = grain(random.below(kGrains)), &cube = cuboid(Vec3(1, 0.8, 0.6));
+  const int other = random.below(8);
+  const Body& b = other == 0 ? pebble_of_size(1) : other == 1 ? cube : grain(random.below(kGrains));
+  PairCase c;
+  if (random.below(4)) {
+    c = imperfect(random, a, b);
+  } else {  // deeper
+    c.a = {a.shape.get(), 1, Vec3::Zero(), random.turn()};
+    c.b = {b.shape.get(), random.log_uniform(0.2, 1), random.uniform(0.3, 1.5) * random.direction(),
+           random.turn()};
+    c.truth = search_truth(c, random);
+  }
+  if (random.below(3) == 0) {
+    c.warm = true;
+    c.a_before = c.a;
+    c.b_before = c.b;
+    c.b_before.q = (random.turn_by(random.log_uniform(1e-4, 0.1)) * c.b.q).normalized();
+  }
+  return c;
+}
+
 }  // namespace
 
 const std::vector<Family>& all_families() {
@@ -707,6 +762,8 @@ const std::vector<Family>& all_families() {
        eccentric_deep},
       {"mismatched joints", "patches each with parameters of its own", kMany, mismatched_joints},
       {"rounded digits", "control points of 6 to 12 decimals: joints gape", kSearched, rounded_digits},
+      {"fitted grains", "fits of irregular hulls to 5, 2 and 1 %, shallow and deep", kSearched,
+       fitted_grains},
   };
   static const std::vector<Family> all = [] {
     std::vector<Family> joined = ovals;
