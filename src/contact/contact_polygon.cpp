@@ -134,7 +134,6 @@ void set_marks(const BodyFrame& reference, const BodyFrame& incident, ContactPol
     return reference.axes.transpose() * (x - reference.x);
   };
   const Vec3 zero = in_reference(0);
-  store(-(incident.axes.transpose() * (reference.axes * load(out->normal))), out->down);
   double most = 0;
   out->far = 0;
   for (int i = 1; i < out->count; ++i) {
@@ -857,10 +856,7 @@ PolygonState evaluate(const ContactPolygon& polygon, const BodyFrame& a, const B
     (a_is_reference ? state.arm_a : state.arm_b)[i] = middle + apart;
   }
   state.energy = 0.5 * energy;
-  if (polygon.rolling != 0)
-    state.rolled =
-        (outward_on_incident + incident.scale * load(polygon.down)).norm() * incident.shape->bounding_radius;
-  if (polygon.count > 0 && (polygon.rolling != 0 || polygon.room < kInfinite)) {
+  if (polygon.count > 0 && polygon.room < kInfinite) {
     const auto lateral = [&](int i, const double* mark) {
       const Vec3 x =
           apart + incident.scale * (incident.axes * load(polygon.point[i])) - reference.axes * load(mark);
@@ -873,9 +869,7 @@ PolygonState evaluate(const ContactPolygon& polygon, const BodyFrame& a, const B
 
 PolygonVerdict judge(const ContactPolygon& polygon, const PolygonState& state) {
   if (!(state.least < 0)) return PolygonVerdict::open;
-  if (state.slid > polygon.room) return PolygonVerdict::moved;
-  if (polygon.rolling != 0 && state.slid + state.rolled > -kRollShare * state.least)
-    return PolygonVerdict::moved;
+  if (polygon.rolling != 0 || state.slid > polygon.room) return PolygonVerdict::moved;
   return state.most > 0 || polygon.count == 2 ? PolygonVerdict::tilted : PolygonVerdict::keep;
 }
 

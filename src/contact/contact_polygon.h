@@ -25,9 +25,10 @@
 //  3. Every step: evaluate, then judge.
 //     keep:   forces from the state.
 //     open:   no point overlaps. Back to the single point and to 1.
-//     moved:  the points slid over the reference outline by more than `room`, or they belong to a ruled line
-//             that rolled on by more than kRollShare of the overlap: remake. Book the jump stored_energy(new) - stored_energy(old), or take it up in
-//             the factor. It is of second order: none under a uniform gap, whatever the weights.
+//     moved:  the points slid over the reference outline by more than `room`, or they belong to a ruled line,
+//             which rolls (points that stay behind on it would drive it on): remake. Book the jump
+//             stored_energy(new) - stored_energy(old), or take it up in the factor. It is of second order:
+//             none under a uniform gap, whatever the weights.
 //     tilted: some points are open, or it stands on a crease, so the body may touch elsewhere: compare with
 //             support_gap (one support search) by outgrown(); only if that says so, remake. That it does not
 //             holds for the way `still_holds`. Where all points
@@ -56,7 +57,6 @@ constexpr double kReach = 3;  // overlaps by which points of one feature may lag
 constexpr double kKeptReach = 12;     // ... and when a polygon is remade: a leaning body stands on few points
 constexpr double kSlideShare = 1e-3;  // of the polygon's size that cut points may slide before a remake: a
                                       // jump of the torque by 5e-4, of U by 1e-7
-constexpr double kRollShare = 1e-5;   // of the overlap that the points of a ruled line may roll before a remake
 constexpr double kReferenceShare = 0.05;  // of the overlap by which the other face must be the shallower one
                                           // to become the reference
 constexpr double kOutgrownShare = 0.1;    // of the overlap by which the body may be deeper than its points
@@ -68,26 +68,25 @@ struct ContactPolygon {
   std::int32_t count;      // 0: none; 2: a segment; 3 to 8: in order around the polygon
   std::int32_t reference;  // 0: A (or the plane), 1: B
   std::int32_t ring;     // > 0: a whole round face, number ring - 1; the points stand for eighths of its rim
-  std::int32_t rolling;  // 1: the points follow a ruled line
+  std::int32_t rolling;  // 1: remake every step, the points follow a ruled line
   std::int32_t far;      // the point furthest from point 0
   double normal[3];      // outward, of the reference plane, in its shape axes (a plane: lab axes)
   double offset;         // normal . x of that plane, scale 1 (a plane: 0, from its origin)
   double factor;         // see above; 1 unless set by the caller
   double room;           // lateral motion until it must be remade, length
   double mark[2][3];     // points 0 and `far` in the reference's axes when made, length
-  double down[3];        // against the reference's normal in the incident body's axes when made
   double point[kContactPoints][3];   // incident shape axes, scale 1
   double weight[kContactPoints];     // sum 1
   std::uint32_t id[kContactPoints];  // vertices or sides that made it, for either reference; 0 unknown
 };
-static_assert(std::is_trivially_copyable_v<ContactPolygon> && sizeof(ContactPolygon) == 432);
+static_assert(std::is_trivially_copyable_v<ContactPolygon> && sizeof(ContactPolygon) == 408);
 
 // A placed body as evaluation needs it; a plane is one with scale 1 and the lab's axes at its origin.
 struct BodyFrame {
   double scale = 1;
   Vec3 x = Vec3::Zero();
   Mat3 axes = Mat3::Identity();  // shape into lab
-  const Shape* shape = nullptr;  // read only for round faces and ruled lines
+  const Shape* shape = nullptr;  // read only for round faces
 };
 BodyFrame body_frame(const Particle& particle);
 BodyFrame plane_frame(const Vec3& origin);
@@ -137,8 +136,7 @@ struct PolygonState {
   Vec3 arm_b[kContactPoints];  // ... and from B's; lab axes
   double least = 0, most = 0;  // of the gaps, of single points
   double energy = 0;           // U / (factor kn)
-  double slid = 0;             // bound on any point's lateral motion over the reference since it was made ...
-  double rolled = 0;           // ... and, of a ruled line, by how much more the incident body turned
+  double slid = 0;             // bound on any point's lateral motion over the reference since it was made
 };
 // About 0.2 us, round faces included.
 PolygonState evaluate(const ContactPolygon& polygon, const BodyFrame& a, const BodyFrame& b);

@@ -136,8 +136,9 @@ class SurfaceSearch {
     return deepest_point(state, gap, on_body);
   }
 
-  // Whether a polygon of the last step stands on the plane and has the body's deepest point, so that no search
-  // is needed: with all the points of a face, or as long as it is known to.
+  // Whether a polygon of the last step stands on the plane and has the body's deepest point, so that no
+  // search is needed: with all the points of a face, as long as it is known to, or, to be remade, on a line
+  // that rolls.
   bool stands_on(const MeshPatch::Plane& plane, ActivePlane* met) const {
     for (int k = 0; k < former_count_; ++k) {
       const FormerContact& f = former_[k];
@@ -147,7 +148,10 @@ class SurfaceSearch {
       polygon.offset = met->normal.dot(plane.origin - f.frame);  // it may have moved, or stand back
       const PolygonState state = evaluate(polygon, plane_frame(f.frame), body_frame(particle_));
       const PolygonVerdict verdict = judge(polygon, state);
-      if (verdict != PolygonVerdict::keep && !(verdict == PolygonVerdict::tilted && path_ < f.until)) continue;
+      const bool bears =
+          verdict == PolygonVerdict::keep || (verdict == PolygonVerdict::tilted && path_ < f.until) ||
+          (verdict == PolygonVerdict::moved && polygon.rolling != 0 && state.slid <= polygon.room);
+      if (!bears) continue;
       if (std::abs(polygon.offset - f.polygon->offset) > -state.least) continue;  // another plane
       met->result = ContactResult{};
       met->result.status = Status::converged;
@@ -180,7 +184,8 @@ class SurfaceSearch {
     }
     if (!stands || !over) {
       MeshPatch::Plane& plane = patch_.planes()[number];
-      if (!stands && path_ + kClearTurn * radius_ * (met.normal - plane.pointed_normal).norm() < plane.pointed)
+      if (!stands &&
+          path_ + kClearTurn * radius_ * (met.normal - plane.pointed_normal).norm() < plane.pointed)
         return false;
       const PlaneRegion region = plane_region(patch_, number, particle_.x);
       const double reach = stands ? kKeptReach : kReach;

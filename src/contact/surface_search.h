@@ -86,9 +86,10 @@ PlaneRegion plane_region(MeshPatch& patch, int plane, const Vec3& body);
 void find_surface_contacts(const Particle& particle, MeshPatch& patch, const ContactSettings& settings,
                            double path, const FormerContact* former, int former_count, SurfaceContacts* out);
 
-// The path up to which a body that has one contact, at a point of a plane's face, has no other and that one on
-// the same face, however it moves: all of the plane that it can reach is wall, and other planes are out of its
-// reach. For walls that stand still; not above `path` where that is not known.
-double one_face_until(const Particle& particle, const MeshPatch& patch, double path, const SurfaceContacts& found);
+// The path up to which a body that has one contact, at a point of a plane's face, has no other and that one
+// on the same face, however it moves: all of the plane that it can reach is wall, and other planes are out of
+// its reach. For walls that stand still; not above `path` where that is not known.
+double one_face_until(const Particle& particle, const MeshPatch& patch, double path,
+                      const SurfaceContacts& found);
 
 }  // namespace nurbs

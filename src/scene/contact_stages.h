@@ -66,7 +66,8 @@ struct WallContact {
   double weight = 1;     // +1, or below 0: what other contacts count twice
   Vec3 velocity = Vec3::Zero(), spin = Vec3::Zero();  // of the wall at point_a; lab
   int mark = 0;                                       // the caller's
-  bool face = false;  // at a point of a plane that stands still: a contact that goes on there follows by itself
+  bool face =
+      false;  // at a point of a plane that stands still: a contact that goes on there follows by itself
   PlaneRegion* region = nullptr;  // that a flat feature of the body stands on, until the end of the step
   std::uint64_t name = 0;         // of the piece of the wall
   double path = 0;                // of the body and the wall together, as Bodies::path

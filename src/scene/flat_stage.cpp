@@ -183,7 +183,9 @@ bool ContactStages::serve_flat(ContactBlock& block, int lane, LeftPolygon* left)
     bool stays = verdict != PolygonVerdict::open;
     double overlap = -state.least;
     if (stays) {
-      const double deepest = block.fresh[lane] != 0  // the caller has sought it
+      const bool rolls = flat.polygon.rolling != 0;  // and is remade in any case
+      const double deepest = rolls ? state.least
+                             : block.fresh[lane] != 0  // the caller has sought it
                                  ? fresh_[block.fresh[lane] - 1].gap
                                  : support_gap(flat.polygon, a < 0 ? nullptr : &first, body, wall_frame(a));
       if (verdict == PolygonVerdict::moved || outgrown(state, deepest)) {

@@ -97,8 +97,8 @@ void ContactStages::update_listed(std::int32_t number, int body, const WallConta
   block.fresh[lane] = static_cast<int>(fresh_.size());
 }
 
-// Whether a contact that goes on can be followed by itself, as a neighbour's: it is at a point of a plane that
-// stands still, passes through the contact's fixed point, and is the one its memory is of.
+// Whether a contact that goes on can be followed by itself, as a neighbour's: it is at a point of a plane
+// that stands still, passes through the contact's fixed point, and is the one its memory is of.
 bool ContactStages::may_follow(std::int32_t number, int body, const WallContact& found) const {
   if (!found.face || found.weight < 0 || found.region != nullptr || step_.bodies->reshaped()) return false;
   const Partner& p = partner(number);

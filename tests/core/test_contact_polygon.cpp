@@ -129,7 +129,9 @@ TEST(PlanePolygon, faces_lines_and_points) {
     EXPECT_NEAR(off.norm(), askew ? 0.2 * half * scale : 0, 1e-9);
     EXPECT_NEAR(support_gap(polygon, nullptr, p, scene.x), -overlap, 1e-12);
     EXPECT_NEAR(stored_energy(polygon, state), 0.5 * overlap * overlap, 1e-14);
-    EXPECT_EQ(judge(polygon, state), c.points == 2 ? PolygonVerdict::tilted : PolygonVerdict::keep);
+    EXPECT_EQ(judge(polygon, state), c.rolling       ? PolygonVerdict::moved
+                                     : c.points == 2 ? PolygonVerdict::tilted
+                                                     : PolygonVerdict::keep);
   }
 }
 
@@ -413,32 +415,8 @@ TEST(PairPolygon, forces_are_the_gradient_of_the_energy) {
   }
 }
 
-// A ruled line's points are remade as soon as it has rolled, or slid, by a share of the overlap.
-TEST(PlanePolygon, a_line_stays_until_it_rolls) {
-  const double overlap = 1e-2;
-  Particle p;
-  p.shape = roller().get();
-  const Quat lying = about(Vec3::UnitX(), M_PI / 2);
-  p.q = lying;
-  p.x[2] = find_support(*p.shape, p.q.conjugate() * -Vec3::UnitZ()).h - overlap;
-  ContactPolygon polygon;
-  ASSERT_TRUE(make_plane_polygon(p, Vec3::Zero(), Vec3::UnitZ(), 2 * overlap, &polygon));
-  ASSERT_EQ(polygon.rolling, 1);
-  const auto verdict = [&](double turn, double way) {
-    Particle at = p;
-    at.q = about(Vec3::UnitY(), turn) * lying;  // about its axis
-    at.x[0] += way;
-    return judge(polygon, evaluate(polygon, plane_frame(Vec3::Zero()), body_frame(at)));
-  };
-  const double allowed = kRollShare * overlap, radius = p.shape->bounding_radius;
-  EXPECT_EQ(verdict(0, 0), PolygonVerdict::tilted);
-  EXPECT_EQ(verdict(0.2 * allowed / radius, 0), PolygonVerdict::tilted);
-  EXPECT_EQ(verdict(1.1 * allowed / radius, 0), PolygonVerdict::moved);
-  EXPECT_EQ(verdict(-1.1 * allowed / radius, 0), PolygonVerdict::moved);
-  EXPECT_EQ(verdict(0, 1.1 * allowed), PolygonVerdict::moved);
-}
-
-// A ruled line that is remade has an energy that is a function of the pose, and the forces are its gradient.
+// A ruled line is remade every step: its energy is then a function of the pose, and the same forces its
+// gradient.
 TEST(PlanePolygon, a_rolling_line_has_a_potential) {
   const double overlap = 1e-2, h = 1e-6;
   Particle p;

@@ -115,7 +115,7 @@ class Rest(unittest.TestCase):
         floor = f"solid s\n{facets}endsolid s\n"
         for lean in (0.1, 0.5, 3):
             for mesh in (None, floor):
-                r = run([atom(1, (0, 0, 0.51), turned((1, 0, 0), 90 - lean))], 60000, shape=tablet, mesh=mesh)
+                r = run([atom(1, (0, 0, 0.51), turned((1, 0, 0), 90 - lean))], 200000, shape=tablet, mesh=mesh)
                 left = r.thermo["kinetic"][-1] / (mass * G * 0.01)
                 print(f"    leaning {lean} degrees on a {'mesh' if mesh else 'plane'}: kinetic energy {left:.1e} of the"
                       f" fall's, contacts {r.thermo['st[8]'][-1]:.0f}", flush=True)
