@@ -15,6 +15,7 @@ namespace {
 constexpr double kFaceCosine = 0.5;  // a face further than 60 degrees from the contact's normal is not asked
 constexpr double kOtherFaceCosine = 0.3;  // nor may one further than 72 degrees soon be
 constexpr double kLineAngle = 0.8;        // rad, the same for the normal of a ruled line
+constexpr double kBesideLine = 1e-8;      // of the bounding radius: a support point this near a line is on it
 constexpr double kThinnest = 1e-7;        // width to length of a polygon below which it is a segment
 constexpr double kInfinite = std::numeric_limits<double>::infinity();
 
@@ -169,6 +170,14 @@ void set_ring(const Shape& shape, int body, int face, ContactPolygon* out) {
   }
 }
 
+// Whether a body's support point is one of a ruled line of its. Pairs ask for it, so that lines beside
+// rounded rims, which lean, make polygons on walls only: of undamped pairs those lose energy.
+bool lies_on(const Shape& shape, const Vec3& support, const Vec3& p, const Vec3& q) {
+  const Vec3 way = q - p, off = support - p;
+  const double t = std::clamp(off.dot(way) / way.squaredNorm(), 0.0, 1.0);
+  return (off - t * way).norm() <= kBesideLine * shape.bounding_radius;
+}
+
 // One attempt at a pair's polygon with a given face as the reference.
 class FaceContact {
  public:
@@ -201,7 +210,8 @@ class FaceContact {
     }
     if (!(least > 0)) return 0;
     RuledLine line;
-    return incident_line(&line) ? std::min(least, segment_room(line.ends, most)) : least;
+    Vec3 support;
+    return incident_line(&line, &support) ? std::min(least, segment_room(line.ends, most)) : least;
   }
 
   // `swallowed`: the reference face lies inside the incident one.
@@ -385,16 +395,21 @@ class FaceContact {
       points_.add(other.plane.corner[i], other.on_body[i], other.gap[i], other.id[i]);
   }
 
-  // The incident body's ruled line that is deepest.
-  bool incident_line(RuledLine* line) const {
+  // The incident body's ruled line that is deepest, and its support point.
+  bool incident_line(RuledLine* line, Vec3* support) const {
     const Shape& shape = *incident_.shape;
-    return !shape.flats.ruling.empty() &&
-           ruled_line(shape, find_hull_support(shape, down()).where, down(), kLineAngle, line);
+    if (shape.flats.ruling.empty()) return false;
+    const Support s = find_hull_support(shape, down());
+    *support = s.point;
+    return ruled_line(shape, s.where, down(), kLineAngle, line);
   }
 
   bool line_points(double most) {
     RuledLine line;
-    if (!incident_line(&line) || !segment(line.ends, {-1, -1}, most, &points_, &whole_)) return false;
+    Vec3 support;
+    if (!incident_line(&line, &support) || !lies_on(*incident_.shape, support, line.ends[0], line.ends[1]) ||
+        !segment(line.ends, {-1, -1}, most, &points_, &whole_))
+      return false;
     ruled_ = true;
     return true;
   }
@@ -427,7 +442,8 @@ struct Line {
 // A crease or ruled line that supports the body in lab direction d, to `tolerance`.
 bool support_line(const Body& body, const Vec3& d, double tolerance, Line* line) {
   const SupportSet set = support_set(*body.shape, body.turned_back(d), tolerance / body.frame.scale);
-  if (set.count != 2) return false;
+  if (set.count != 2 || (set.ruled && !lies_on(*body.shape, set.support, set.point[0], set.point[1])))
+    return false;
   for (int i = 0; i < 2; ++i) {
     line->ends[i] = body.place(set.point[i]);
     line->vertex[i] = set.vertex[i];
