@@ -16,6 +16,7 @@ constexpr double kFaceCosine = 0.5;  // a face further than 60 degrees from the 
 constexpr double kOtherFaceCosine = 0.3;  // nor may one further than 72 degrees soon be
 constexpr double kLineAngle = 0.8;        // rad, the same for the normal of a ruled line
 constexpr double kBesideLine = 1e-8;      // of the bounding radius: a support point this near a line is on it
+constexpr double kLeaning = 1.0 / 6;      // of the reach: half the overlap when new, two when it is remade
 constexpr double kThinnest = 1e-7;        // width to length of a polygon below which it is a segment
 constexpr double kInfinite = std::numeric_limits<double>::infinity();
 
@@ -176,6 +177,13 @@ bool lies_on(const Shape& shape, const Vec3& support, const Vec3& p, const Vec3&
   const Vec3 way = q - p, off = support - p;
   const double t = std::clamp(off.dot(way) / way.squaredNorm(), 0.0, 1.0);
   return (off - t * way).norm() <= kBesideLine * shape.bounding_radius;
+}
+
+// Whether a support set is a ruled line beside a rounded rim that bears at one end only: with half its
+// weights it would be half as stiff as the rim.
+bool leans(const Shape& shape, const Vec3& d, const SupportSet& set, double tolerance) {
+  if (!set.ruled || lies_on(shape, set.support, set.point[0], set.point[1])) return false;
+  return set.h - std::min(d.dot(set.point[0]), d.dot(set.point[1])) > kLeaning * tolerance;
 }
 
 // One attempt at a pair's polygon with a given face as the reference.
@@ -556,7 +564,7 @@ bool make_plane_polygon(const Particle& particle, const Vec3& origin, const Vec3
   const BodyFrame frame = body_frame(particle);
   const Vec3 d = frame.axes.transpose() * -normal;
   const SupportSet set = support_set(shape, d, reach / frame.scale);
-  if (set.count < 2) {
+  if (set.count < 2 || leans(shape, d, set, reach / frame.scale)) {
     if (clear) *clear = clear_way(particle, d, reach, set);
     return false;
   }
@@ -699,7 +707,7 @@ RegionContact make_region_polygon(const Particle& particle, const PlaneRegion& r
   };
   const Vec3 d = body.turned_back(-region.normal);
   const SupportSet set = support_set(shape, d, reach / body.frame.scale);
-  if (set.count < 2) {
+  if (set.count < 2 || leans(shape, d, set, reach / body.frame.scale)) {
     if (clear) *clear = clear_way(particle, d, reach, set);
     return RegionContact::point;
   }
