@@ -171,6 +171,7 @@ struct Range {
     low = std::min(low, x);
     high = std::max(high, x);
   }
+  bool one_way() const { return high <= 0 || low >= 0; }
   double magnitude() const { return std::max(std::abs(low), std::abs(high)); }
 };
 
@@ -232,6 +233,15 @@ void difference_bicubic(const double* g, Bounds* b) {
   const Lane4 zero{0, 0, 0, 0};
   b->guv = {-highest(larger<Lane4>(zero - mixed[0], larger<Lane4>(zero - mixed[1], zero - mixed[2]))),
             highest(larger(mixed[0], larger(mixed[1], mixed[2])))};
+}
+
+Bounds bounds_of(const Box& box, bool bicubic, const double* g) {
+  Bounds b;
+  if (bicubic)
+    difference_bicubic(g, &b);
+  else
+    difference(g, box.nu, box.nv, &b);
+  return b;
 }
 
 class Search {
@@ -336,13 +346,9 @@ class Search {
       if (box.nu > 0 && box.nv > 0) offer_corner(box, true, true);
       if (box.nu == 0 && box.nv == 0) return Next::done;
       if (best_->h > before && !lower(box, bicubic, g)) return Next::done;
-      Bounds b;
-      if (bicubic)
-        difference_bicubic(g, &b);
-      else
-        difference(g, box.nu, box.nv, &b);
-      const bool one_u = box.nu > 0 && (b.gu.high <= 0 || b.gu.low >= 0);
-      const bool one_v = box.nv > 0 && (b.gv.high <= 0 || b.gv.low >= 0);
+      const Bounds b = bounds_of(box, bicubic, g);
+      bool one_u = box.nu > 0 && b.gu.one_way(), one_v = box.nv > 0 && b.gv.one_way();
+      if (box.rational && (one_u || one_v)) stays_monotone(box, bicubic, b, &one_u, &one_v);
       if (one_u || one_v) {
         if (one_u) keep_edge(true, b.gu.high > 0, &box);
         if (one_v) keep_edge(false, b.gv.high > 0, &box);
@@ -361,6 +367,21 @@ class Search {
                    bend_v = box.nv * (box.nv - 1) * b.gvv.magnitude();
       return bend_u > bend_v ? Next::halve_u : Next::halve_v;
     }
+  }
+
+  // Whether f - level w, monotone at this level, is so, the same way, at all levels that points of the box
+  // may have: the differences are affine in the level. Otherwise its edge, once it has raised best, would say
+  // nothing of the inside.
+  static void stays_monotone(const Box& box, bool bicubic, const Bounds& b, bool* one_u, bool* one_v) {
+    const double level = highest_coefficient(box);
+    double g[kMost];
+    for (int k = 0; k < box.size(); ++k) g[k] = box.f[k] - level * box.w[k];
+    const Bounds top = bounds_of(box, bicubic, g);
+    const auto same_way = [](const Range& p, const Range& q) {
+      return (p.high <= 0 && q.high <= 0) || (p.low >= 0 && q.low >= 0);
+    };
+    *one_u = *one_u && same_way(b.gu, top.gu);
+    *one_v = *one_v && same_way(b.gv, top.gv);
   }
 
   // Whether g is concave on the box and, from the gradient at its maximum there, proven not to be positive.
@@ -427,7 +448,7 @@ void raise_to_corner(const BezierPatch& patch, int index, const Vec3& d, double 
     const double h = d.dot(p.head<3>()) / p[3];
     if (!(h > best->h)) continue;
     best->h = h;
-    best->where = {index, static_cast<double>(k / 2), static_cast<double>(k % 2)};
+    best->where = {index, k > 1 ? 1.0 : 0.0, k % 2 == 1 ? 1.0 : 0.0};
   }
   best->upper = std::max(best->upper, best->h + slack);
 }
