@@ -3,11 +3,13 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstddef>
 #include <limits>
 
 namespace nurbs {
 namespace {
 
+constexpr std::size_t kLanes = 8;         // sides looked at together
 constexpr double kEqualTriangles = 1e-6;  // relative: triangles that count as equal when thinning
 constexpr double kSameCentre = 1e-26;     // squared shift, relative to the squared size, that is round-off
 constexpr double kSliver = 1e-10;         // squared width to length of a polygon too thin to shift across
@@ -32,16 +34,31 @@ struct SideLine {
   double distance(const Vec2& x) const { return normal.dot(x) - offset; }
 };
 
+// Whether side `cut` of `window` has a corner of `subject` more than `slack` outside. `lowest`: the corner
+// that was furthest outside the side before, near which this one's is: the distance falls and rises once
+// round a convex polygon, so that all sides together look at each corner a few times.
+bool cuts(const ConvexPolygon& subject, const ConvexPolygon& window, int cut, double slack, int* lowest) {
+  const Vec2 &from = window.corner[cut], along = window.corner[window.next(cut)] - from;
+  const auto inside = [&](int i) { return cross2(along, subject.corner[i] - from); };  // times the length
+  int at = *lowest < subject.count ? *lowest : 0;
+  double least = inside(at);
+  for (const bool forwards : {true, false})
+    for (int k = 0; k < subject.count; ++k) {
+      const int next = forwards ? subject.next(at) : subject.before(at);
+      const double there = inside(next);
+      if (there > least) break;
+      least = there;
+      at = next;
+    }
+  *lowest = at;
+  return least < 0 && least * least > slack * slack * along.squaredNorm();
+}
+
 // Keeps what lies left of side `cut` of `window`.
 void cut_by(ConvexPolygon& subject, const ConvexPolygon& window, int cut, double slack) {
   const SideLine line(window, cut);
   double distance[ConvexPolygon::kMost];
-  bool whole = true;
-  for (int i = 0; i < subject.count; ++i) {
-    distance[i] = line.distance(subject.corner[i]);
-    whole = whole && distance[i] >= -slack;
-  }
-  if (whole) return;
+  for (int i = 0; i < subject.count; ++i) distance[i] = line.distance(subject.corner[i]);
   ConvexPolygon out;
   for (int i = 0; i < subject.count; ++i) {
     const int j = subject.next(i);
@@ -110,13 +127,39 @@ double depth_inside(const ConvexPolygon& polygon, const ConvexPolygon& points) {
   return least_depth(polygon, points.corner, points.count);
 }
 
+SideLines::SideLines(const ConvexPolygon& polygon) {
+  for (int i = 0; i < polygon.count; ++i) {
+    const SideLine line(polygon, i);
+    x_.push_back(line.normal[0]);
+    y_.push_back(line.normal[1]);
+    offset_.push_back(line.offset);
+  }
+  const std::size_t padded = (x_.size() + kLanes - 1) / kLanes * kLanes;
+  x_.resize(padded, 0);
+  y_.resize(padded, 0);
+  offset_.resize(padded, -std::numeric_limits<double>::infinity());
+}
+
+double SideLines::depth_inside(const Vec2& point) const {
+  double least[kLanes];
+  std::fill(least, least + kLanes, std::numeric_limits<double>::infinity());
+  for (std::size_t i = 0; i < x_.size(); i += kLanes)
+    for (std::size_t k = 0; k < kLanes; ++k) {
+      const double d = x_[i + k] * point[0] + y_[i + k] * point[1] - offset_[i + k];
+      least[k] = d < least[k] ? d : least[k];
+    }
+  return *std::min_element(least, least + kLanes);
+}
+
 ConvexPolygon intersect(const ConvexPolygon& subject, const ConvexPolygon& window, double slack) {
   ConvexPolygon p = subject;
   for (int i = 0; i < p.count; ++i) {
     p.owner[i] = 0;
     p.side[i] = i;
   }
-  for (int i = 0; i < window.count && p.count > 0; ++i) cut_by(p, window, i, slack);
+  int lowest = 0;
+  for (int i = 0; i < window.count && p.count > 0; ++i)
+    if (cuts(p, window, i, slack, &lowest)) cut_by(p, window, i, slack);
   merge_corners(p, slack);
   if (p.count < 3) p.count = 0;
   return p;

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdint>
+#include <vector>
 
 #include "nurbs/types.h"
 
@@ -39,6 +40,17 @@ Vec2 polygon_centroid(const ConvexPolygon& polygon);  // its area must be > 0
 // nearest of the lines through its sides, < 0 outside.
 double depth_inside(const ConvexPolygon& polygon, const Vec2& point);
 double depth_inside(const ConvexPolygon& polygon, const ConvexPolygon& points);
+
+// The lines through a polygon's sides, kept for one that is asked often.
+class SideLines {
+ public:
+  SideLines() = default;
+  explicit SideLines(const ConvexPolygon& polygon);
+  double depth_inside(const Vec2& point) const;  // as above
+
+ private:
+  std::vector<double> x_, y_, offset_;  // padded, so that several are looked at together
+};
 
 // `subject` cut by `window`, both of at most kOutlinePoints corners (Sutherland & Hodgman, Comm. ACM 17
 // (1974) 32). Corners of `subject` outside by less than `slack` (length) count as inside, and corners closer

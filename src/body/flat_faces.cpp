@@ -282,6 +282,9 @@ class Finder {
   void thin_outline(FlatFace& face) const {
     ConvexPolygon polygon;
     for (const int v : face.outline) polygon.add(face.project(out_.vertices[v]));
+    face.sides = SideLines(polygon);
+    for (const int v : face.outline)
+      face.radius = std::max(face.radius, (out_.vertices[v] - face.centroid).norm());
     face.weight.resize(face.outline.size());
     corner_weights(polygon, face.project(face.centroid), face.weight.data());
     int kept[ConvexPolygon::kMost];

@@ -28,6 +28,8 @@ struct FlatFace {
   bool round = false;            // `outline` is inscribed in the true outline, not equal to it
   std::vector<int> outline;      // vertices, counterclockwise from outside, at most kOutlinePoints
   std::vector<int> corners;      // at most kContactPoints of them, ascending in `outline`
+  SideLines sides;               // of `outline`, in project()'s coordinates
+  double radius = 0;             // of the circle about the centroid that holds it
   std::vector<double> weight;    // of the outline's vertices under a uniform load, sum 1: corner_weights
 
   Vec3 axis_v() const { return normal.cross(axis_u); }

@@ -2,6 +2,7 @@
 #include "body/revolution.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 
@@ -145,6 +146,89 @@ bool guess_axis(const std::vector<BezierPatch>& patches, bool arcs_in_u, Revolut
   return largest > 0;
 }
 
+// Points of a patch on arcs about the axis: one line of parameters, from the profile's ends and inside.
+constexpr int kOnArc = 6, kArcs = 5;
+constexpr double kNoArcs = 1e-6;  // of the size: no refinement of the axis makes up for being off by more
+using Ring = std::array<Point, kOnArc>;
+
+// The Bernstein polynomials of a degree at `count` parameters from 0 to 1.
+std::vector<Row> bases(int degree, int count) {
+  std::vector<Row> all(count);
+  for (int k = 0; k < count; ++k) {
+    const Real t = static_cast<Real>(k) / (count - 1);
+    for (int i = 0; i <= degree; ++i)
+      all[k].push_back(static_cast<Real>(binomial(degree, i)) * std::pow(t, i) * std::pow(1 - t, degree - i));
+  }
+  return all;
+}
+
+std::vector<Ring> rings_of(const BezierPatch& patch, bool arcs_in_u) {
+  const std::vector<Row> in_u = bases(patch.degree_u, arcs_in_u ? kOnArc : kArcs),
+                         in_v = bases(patch.degree_v, arcs_in_u ? kArcs : kOnArc);
+  std::vector<Ring> rings(kArcs);
+  for (int l = 0; l < kArcs; ++l)
+    for (int k = 0; k < kOnArc; ++k) {
+      const Row &bu = in_u[arcs_in_u ? k : l], &bv = in_v[arcs_in_u ? l : k];
+      Eigen::Matrix<Real, 4, 1> p = Eigen::Matrix<Real, 4, 1>::Zero();
+      for (int i = 0; i <= patch.degree_u; ++i)
+        for (int j = 0; j <= patch.degree_v; ++j) p += bu[i] * bv[j] * patch.point(i, j).cast<Real>();
+      rings[l][k] = p.head<3>() / p[3];
+    }
+  return rings;
+}
+
+// Least squares of two unknowns.
+struct Normals {
+  Eigen::Matrix<Real, 2, 2> matrix = Eigen::Matrix<Real, 2, 2>::Zero();
+  Eigen::Matrix<Real, 2, 1> right = Eigen::Matrix<Real, 2, 1>::Zero();
+  void add(Real a, Real b, Real value) {
+    const Eigen::Matrix<Real, 2, 1> row(a, b);
+    matrix += row * row.transpose();
+    right += value * row;
+  }
+  Point solve(const Axes& axes) const {  // along t and s
+    if (!(std::abs(matrix.determinant()) > 0)) return Point::Zero();
+    const Eigen::Matrix<Real, 2, 1> x = matrix.inverse() * right;
+    return x[0] * axes.t + x[1] * axes.s;
+  }
+};
+
+// The axis that all rings are nearest to being about: three points of one of them know it to some round-offs
+// only.
+void settle_axis(const std::vector<BezierPatch>& patches, double size, Revolution* r) {
+  const Axes axes(*r);
+  Normals tilt, shift;
+  for (const BezierPatch& patch : patches) {
+    Real least = std::numeric_limits<Real>::infinity();
+    for (const bool arcs_in_u : {true, false}) {
+      const std::vector<Ring> rings = rings_of(patch, arcs_in_u);
+      Normals tilted = tilt, shifted = shift;
+      Real off = 0;
+      for (const Ring& ring : rings) {
+        const auto radius = [&](const Point& x) {
+          return std::hypot(axes.t.dot(x - axes.point), axes.s.dot(x - axes.point));
+        };
+        for (int k = 1; k < kOnArc; ++k) {
+          const Point step = ring[k] - ring[0];
+          const Real rise = axes.axis.dot(step), r0 = radius(ring[0]), rk = radius(ring[k]);
+          off = std::max({off, std::abs(rise), std::abs(rk - r0)});
+          tilted.add(axes.t.dot(step), axes.s.dot(step), -rise);
+          if (!(std::min(r0, rk) > kArcError * size)) continue;
+          const Point e = (ring[k] - axes.point) / rk - (ring[0] - axes.point) / r0;
+          shifted.add(axes.t.dot(e), axes.s.dot(e), rk - r0);
+        }
+      }
+      least = std::min(least, off);
+      if (!(off <= kArcError * size)) continue;
+      tilt = tilted;
+      shift = shifted;
+    }
+    if (least > kNoArcs * size && out_of_plane(patch, r->axis) > kNoArcs * size) return;  // no revolution
+  }
+  r->axis = (axes.axis + tilt.solve(axes)).normalized().cast<double>();
+  r->point = (axes.point + shift.solve(axes)).cast<double>();
+}
+
 // An ellipsoid with two equal semi-axes, to round-off.
 Revolution about_axis_of(const Ellipsoid& e, double size) {
   Revolution r;
@@ -166,6 +250,7 @@ Revolution find_revolution(const std::vector<BezierPatch>& patches, const Ellips
   for (const bool arcs_in_u : {true, false}) {
     Revolution r;
     if (!guess_axis(patches, arcs_in_u, &r)) continue;
+    for (int pass = 0; pass < 2; ++pass) settle_axis(patches, size, &r);  // the tilt moves the points
     for (const BezierPatch& patch : patches) {
       double error = out_of_plane(patch, r.axis);
       if (error > kArcError * size)

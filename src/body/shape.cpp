@@ -269,9 +269,10 @@ void measure(Draft& draft) {
   s.rates = std::move(bounds.rates);
   s.joints = measure_joint_distance(s);
   s.normal_map = make_normal_map(s, &bounds);
-  s.atlas = make_atlas(s, kAtlasCells);
   s.ellipsoid = find_ellipsoid(s.patches, s.mass.inertia / s.mass.volume);
   s.revolution = find_revolution(s.patches, s.ellipsoid, s.bounding_radius);
+  if (s.joint_slack == 0) s.meridian = make_meridian(s.patches, s.revolution, s.bounding_radius);
+  s.atlas = make_atlas(s, kAtlasCells);
 }
 
 void check_gyration(const Mat3& given) {

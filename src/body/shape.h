@@ -15,6 +15,7 @@
 #include "body/ellipsoid.h"
 #include "body/flat_faces.h"
 #include "body/inner_map.h"
+#include "body/meridian.h"
 #include "body/normal_map.h"
 #include "body/revolution.h"
 #include "body/rolling.h"
@@ -127,6 +128,7 @@ struct Shape {
   LazyInnerMap lazy_inner_map;
   Ellipsoid ellipsoid;    // that the body is, if it is one
   Revolution revolution;  // about an axis, if the body is one
+  Meridian meridian;      // whose profile this is; empty for other bodies
   FlatFeatures flats;     // faces, creases and ruled lines; empty for round bodies
 
   // Balls inside the body over directions.

@@ -14,8 +14,7 @@
 namespace nurbs {
 namespace {
 
-constexpr double kFanSafety = 1.1;               // sines of slopes stand for angles
-constexpr double kTangentNoise = 4 * kRoundoff;  // of the body: round-off of a surface tangent
+constexpr double kFanSafety = 1.1;  // sines of slopes stand for angles
 
 // The end of edge `edge` in patch parameters, and which parameter is pinned on it.
 bool pins_u(int edge) {
@@ -354,15 +353,32 @@ bool is_certain(const Shape& shape, const Support& s, double enough) {
          s.upper - s.h <= std::max(enough, 2 * kSupportSlack * kRoundoff * shape.bounding_radius);
 }
 
+// By the meridian; false where the body has none, or round-off leaves it open.
+bool find_on_meridian(const Shape& shape, const Vec3& d, const SurfacePoint* start, Support* s) {
+  MeridianSupport found;
+  if (shape.meridian.empty() ||
+      !find_meridian_support(shape.meridian, d, shape.bounding_radius, start, &found))
+    return false;
+  const Jet1 jet = evaluate1(shape.patches[found.where.patch], found.where.u, found.where.v);
+  set_point(shape, d, found.where, jet.s, jet.su, jet.sv, s);
+  s->upper = std::max(found.upper, s->h);
+  s->slope = 0;
+  s->iterations = 1;
+  s->converged = true;
+  return is_certain(shape, *s, 0);
+}
+
 }  // namespace
 
 Support find_support(const Shape& shape, const Vec3& d, const SurfacePoint* start) {
+  if (Support s; find_on_meridian(shape, d, start, &s)) return s;
   const Support local = begin(shape, d, start_for(shape, d, start));
   if (is_certain(shape, local, 0) || (shape.dented() && std::isfinite(local.upper))) return local;
   return search_patches(shape, d, local);
 }
 
 Support find_hull_support(const Shape& shape, const Vec3& d, const SurfacePoint* start, double enough) {
+  if (Support s; find_on_meridian(shape, d, start, &s)) return s;
   const Support local = begin(shape, d, start_for(shape, d, start));
   return is_certain(shape, local, enough) ? local : search_patches(shape, d, local);
 }
@@ -373,7 +389,9 @@ Support confirm_support(const Shape& shape, const Vec3& d, const SurfacePoint& a
   const Normal normal = set_point(shape, d, at, jet.s, jet.su, jet.sv, &s);
   s.upper = s.h + excess_at(shape, d, at, normal) + kRoundoff * shape.bounding_radius;
   s.converged = true;
-  return is_certain(shape, s, 0) ? s : search_patches(shape, d, s);
+  if (is_certain(shape, s, 0)) return s;
+  if (Support found; find_on_meridian(shape, d, &at, &found)) return found;
+  return search_patches(shape, d, s);
 }
 
 bool find_rival(const Shape& shape, const Vec3& d, const Support& best, Support* rival) {

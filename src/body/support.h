@@ -27,8 +27,8 @@ struct Support {
 Support find_support(const Shape& shape, const Vec3& d, const SurfacePoint* start = nullptr);
 
 // The support of the body's convex hull, whatever its patches look like. h and upper differ by `enough` at
-// most, a length, or by a few ulp of the bounding radius. 0.1 to 0.5 us where Newton's end is proven to be
-// the support, some us where the patches have to be searched (patch_maximum.h).
+// most, a length, or by a few ulp of the bounding radius. 0.1 to 0.5 us by the meridian or where Newton's end
+// is proven to be the support, some us where the patches have to be searched (patch_maximum.h).
 Support find_hull_support(const Shape& shape, const Vec3& d, const SurfacePoint* start = nullptr,
                           double enough = 0);
 

@@ -117,6 +117,19 @@ constexpr double kEllipsoid = 1e-12;      // relative: a body this near an ellip
 constexpr double kArcRoundoff = 1e-14;  // of the body's size: distance from the axis that is none
 constexpr double kArcError = 1e-12;     // of it: what arcs about the axis may be off by
 
+// --- meridians
+constexpr double kMeridianError = 1e-14;  // of the body's size: patches this near a profile times an arc, ...
+constexpr double kMeridianLack = 1.6e-15;  // ... if in all they are no further from it than this
+constexpr double kMeridianOver = 1e-9;     // rad, parameters: overlap of the patches round the axis
+constexpr int kMeridianStarts = 64;        // directions of its table
+constexpr int kMeridianSteps = 16;         // of Newton; 2 to 4 are usual
+constexpr double kMeridianSlope = 0.1;     // of a support's round-off: what is left to gain
+constexpr double kMeridianStep = 1e-7;     // of the body's size: Newton's next place is not evaluated
+constexpr int kMeridianHalvings = 20;      // of a step that does not ascend
+constexpr int kMeridianDepth = 40;         // of bisection
+constexpr double kMeridianEnd = 1e-3;      // parameter: a maximum this near an end splits no piece
+constexpr double kMeridianTurn = 1e-14;    // parameter: step round the axis that is round-off
+
 // --- support mapping
 constexpr int kSupportIterations = 60;  // 3 to 5 are usual; hops between patches count too
 constexpr double kSlopeTolerance =
@@ -131,6 +144,7 @@ constexpr double kPoleNormal = 1e-8;    // nearer to a pole than this (relative 
 constexpr double kPoleSpeed = 1e-6;     // root of |Su x Sv| over the bounding radius, and ...
 constexpr double kLeastSine = 1e-4;     // ... sine between the tangents, below which a normal is no proof
 constexpr double kNormalNoise = 4e-16;  // round-off of a normal whose tangents are at right angles
+constexpr double kTangentNoise = 4 * kRoundoff;  // of the body: round-off of a surface tangent
 constexpr double kFlatCurvature = 1e-12;   // over the bounding radius: a curvature below this says nothing
                                            // about how far to step
 constexpr double kSingularMetric = 1e-24;  // square of the sine of the angle between the tangents, below

@@ -1,0 +1,63 @@
+// The meridian of a body of revolution: its support is a plane curve's.
+#pragma once
+
+#include <array>
+#include <vector>
+
+#include "body/direction_atlas.h"
+#include "body/revolution.h"
+#include "nurbs/bezier_patch.h"
+#include "nurbs/types.h"
+
+namespace nurbs {
+
+// Of a body whose patches are products of a profile and an arc: point = axis point + r(t) e(s) + z(t) axis.
+// Empty for all others. Lengths and axes are the shape frame's.
+struct Meridian {
+  using Row = std::array<double, kMaxDegree + 1>;
+  struct Piece {  // of the profile, in Bernstein form
+    int degree = 0;
+    Row r{}, z{}, w{};  // homogeneous: distance from the axis, height over the axis point, weight
+    double speed = 0;   // |d(r, z)/dt| is at most this
+    int first_sector = 0, sectors = 0;  // the patches that it sweeps
+  };
+  struct Sector {  // of one patch round the axis
+    int patch = 0;
+    bool arcs_in_u = true;        // which of its parameters runs round
+    bool backwards = false;       // its other one runs against the piece's
+    int degree = 0;               // of the arc
+    Row x{}, y{};                 // homogeneous, of a circle of radius 1
+    double begin = 0, sweep = 0;  // angles of its ends, rad; signed
+  };
+  struct Place {
+    int piece = -1;
+    double t = 0;
+  };
+  std::vector<Piece> pieces;
+  std::vector<Sector> sectors;
+  std::vector<Place> starts;     // of supports, over directions
+  std::vector<int> sector_of;    // per patch; -1: of a plane that other patches bound
+  Mat3 axes = Mat3::Identity();  // rows: two across the axis, and the axis
+  Vec3 point = Vec3::Zero();     // on it
+  double error = 0;              // by how much the body's support may exceed that of the above
+
+  bool empty() const { return pieces.empty(); }
+};
+
+// Of a body of revolution whose joints meet to round-off. `size`: bounding radius. Patches in a plane square
+// to the axis need not be such products: the rest bounds them.
+Meridian make_meridian(const std::vector<BezierPatch>& patches, const Revolution& revolution, double size);
+
+struct MeridianSupport {
+  SurfacePoint where;
+  double upper;  // of the support function
+};
+
+// Where a body has its support along d, unit; false where round-off leaves it open. `start`, where one is
+// known, chooses among points that are all as high. The profile's pieces are climbed by Newton, and by
+// Bernstein coefficients no point of any is higher than `upper`: dents, creases, lines and poles change
+// nothing. No allocation; 0.1 to 0.2 us.
+bool find_meridian_support(const Meridian& meridian, const Vec3& d, double size, const SurfacePoint* start,
+                           MeridianSupport* found);
+
+}  // namespace nurbs

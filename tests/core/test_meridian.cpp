@@ -1,0 +1,122 @@
+// Meridians of bodies of revolution against the search over their patches, closed forms, and bodies that have
+// none.
+#include <gtest/gtest.h>
+
+#include <memory>
+#include <vector>
+
+#include "body/support.h"
+#include "shapes/revolved.h"
+#include "support/bodies.h"
+#include "support/flat_bodies.h"
+#include "support/random.h"
+#include "support/solids.h"
+
+namespace nurbs {
+namespace {
+
+using test::Random;
+using test::Solid;
+using ShapePointer = std::shared_ptr<const Shape>;
+
+std::vector<ShapePointer> bodies_of_revolution(Random& random) {
+  std::vector<ShapePointer> all;
+  for (const double weights : {1.0, 100.0})
+    for (const Solid& solid :
+         {test::cone(random, random.log_uniform(0.1, 10), 1, weights),
+          test::double_cone(random, 1, random.log_uniform(0.1, 1), random.log_uniform(0.1, 1), weights),
+          test::cylinder(random, random.log_uniform(0.1, 10), 1, weights),
+          test::frustum(random, 0.5, random.uniform(0.1, 0.4), 1, weights)})
+      all.push_back(solid.shape);
+  for (const Solid& solid :
+       {test::capsule(random, 0.5, 0.3), test::lens(random, 1.5), test::spherical_segment(random, -0.5, 0.3),
+        test::conic_of_revolution(random, 0.5, 0.3, 0.01), test::turned_reuleaux(random)})
+    all.push_back(solid.shape);
+  all.push_back(make_shape("tablet", tablet(1, 0.8, 0.2)));
+  all.push_back(make_shape("biconvex", biconvex_tablet(1, 0.4, 1.5, 0.05)));
+  all.push_back(make_shape("rounded lens", lens(1, 2, 0.1)));
+  all.push_back(make_shape("egg", egg(1, 0.8, 1.5)));
+  all.push_back(make_shape("rounded cylinder", test::rounded_cylinder(1, 0.8, 0.2)));
+  all.push_back(make_shape("polar", revolved_ellipsoid(1, 0.2)));
+  return all;
+}
+
+// Any, or near the axis, or nearly square to it.
+Vec3 direction_for(const Shape& shape, Random& random) {
+  const Vec3 axis = shape.revolution.axis, any = random.direction();
+  const double off = random.log_uniform(1e-17, 1);
+  switch (random.below(3)) {
+    case 0:
+      return any;
+    case 1:
+      return (random.sign() * axis + off * any).normalized();
+    default:
+      return (axis.cross(random.direction()).normalized() + off * any).normalized();
+  }
+}
+
+TEST(Meridian, agrees_with_the_search_over_patches) {
+  Random random(1);
+  for (const ShapePointer& shape : bodies_of_revolution(random)) {
+    ASSERT_FALSE(shape->meridian.empty()) << shape->name;
+    Shape patches = *shape;
+    patches.meridian = {};
+    const double noise = 8 * kRoundoff * shape->bounding_radius;
+    int unproven = 0;
+    for (int k = 0; k < 1500; ++k) {
+      const Vec3 d = direction_for(*shape, random);
+      const SurfacePoint start{random.below(static_cast<int>(shape->patches.size())), random.uniform(0, 1),
+                               random.uniform(0, 1)};
+      const SurfacePoint* from = k % 2 ? &start : nullptr;
+      MeridianSupport found;
+      if (!find_meridian_support(shape->meridian, d, shape->bounding_radius, from, &found)) {
+        ++unproven;
+        continue;
+      }
+      const double h = d.dot(evaluate0(shape->patches[found.where.patch], found.where.u, found.where.v));
+      const Support truth = find_hull_support(patches, d);
+      ASSERT_TRUE(truth.converged);
+      EXPECT_GE(found.upper, truth.h) << shape->name << " " << k;
+      EXPECT_LE(found.upper, truth.upper + noise) << shape->name << " " << k;
+      EXPECT_GE(h, truth.h - noise) << shape->name << " " << k;
+      EXPECT_LE(h, truth.upper + noise) << shape->name << " " << k;
+    }
+    EXPECT_LE(unproven, 15) << shape->name;
+  }
+}
+
+// Along a line of the profile every point is as high: the start's is kept, so that contacts do not wander.
+TEST(Meridian, stays_where_it_starts_on_a_line) {
+  const ShapePointer shape = make_shape("rounded cylinder", test::rounded_cylinder(1, 0.8, 0.2));
+  Random random(2);
+  int kept = 0;
+  for (int patch = 0; patch < static_cast<int>(shape->patches.size()); ++patch) {
+    for (int k = 0; k < 20; ++k) {
+      const SurfacePoint start{patch, random.uniform(0, 1), random.uniform(0, 1)};
+      const Jet1 jet = evaluate1(shape->patches[patch], start.u, start.v);
+      if (std::abs(jet.s.z()) > 0.55) continue;  // not on the band
+      const Vec3 d = Vec3(jet.s.x(), jet.s.y(), 0).normalized();
+      const Support s = find_hull_support(*shape, d, &start);
+      EXPECT_NEAR(s.point.z(), jet.s.z(), 1e-12);
+      ++kept;
+    }
+  }
+  EXPECT_GT(kept, 50);
+}
+
+TEST(Meridian, is_of_bodies_of_revolution_only) {
+  Random random(3);
+  EXPECT_TRUE(test::polyhedron(random, 20, 0.7).shape->meridian.empty());
+  EXPECT_TRUE(test::ellipsoid_solid(Vec3(1, 0.8, 0.6)).shape->meridian.empty());
+  EXPECT_TRUE(test::ellipsoid_solid(Vec3(1, 1, 0.6)).shape->meridian.empty());  // cube patches: no products
+  EXPECT_TRUE(test::reuleaux_prism(random, 0.5).shape->meridian.empty());
+  // A little off round.
+  const Solid round = test::cylinder(random, 1, 1);
+  std::vector<NurbsSurface> surfaces = round.shape->surfaces;
+  for (NurbsSurface& s : surfaces)
+    for (Vec4& p : s.points) p.x() *= 1 + 1e-12;
+  EXPECT_TRUE(make_shape("oval", surfaces)->meridian.empty());
+}
+
+}  // namespace
+}  // namespace nurbs
