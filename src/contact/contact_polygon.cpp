@@ -24,6 +24,9 @@ constexpr double kInfinite = std::numeric_limits<double>::infinity();
 // overlap grow by up to five times the way, heights on inclined faces change by more than it.
 constexpr double kWayShare = 0.1, kMostRoom = 0.3;
 
+constexpr double kMostAcross = 0.1;  // rad: one step of the search for the least overlap across lines
+constexpr int kAcrossSteps = 12;     // of them; 2 to 3 are usual
+
 void store(const Vec3& v, double* out) {
   for (int k = 0; k < 3; ++k) out[k] = v[k];
 }
@@ -173,17 +176,20 @@ void set_ring(const Shape& shape, int body, int face, ContactPolygon* out) {
 
 // Whether a body's support point is one of a ruled line of its. Pairs ask for it, so that lines beside
 // rounded rims, which lean, make polygons on walls only: of undamped pairs those lose energy.
-bool lies_on(const Shape& shape, const Vec3& support, const Vec3& p, const Vec3& q) {
+bool is_on_line(const Shape& shape, const Vec3& support, const Vec3& p, const Vec3& q) {
   const Vec3 way = q - p, off = support - p;
   const double t = std::clamp(off.dot(way) / way.squaredNorm(), 0.0, 1.0);
   return (off - t * way).norm() <= kBesideLine * shape.bounding_radius;
 }
 
-// Whether a support set is a ruled line beside a rounded rim that bears at one end only: with half its
-// weights it would be half as stiff as the rim.
-bool leans(const Shape& shape, const Vec3& d, const SupportSet& set, double tolerance) {
-  if (!set.ruled || lies_on(shape, set.support, set.point[0], set.point[1])) return false;
-  return set.h - std::min(d.dot(set.point[0]), d.dot(set.point[1])) > kLeaning * tolerance;
+// The support set that stands on a plane. A ruled line beside a rounded rim that bears at one end only is a
+// point: with half its weights it would be half as stiff as the rim.
+SupportSet standing_set(const Shape& shape, const Vec3& d, double tolerance) {
+  SupportSet set = support_set(shape, d, tolerance);
+  const bool leans = set.ruled && !is_on_line(shape, set.support, set.point[0], set.point[1]) &&
+                     set.h - std::min(d.dot(set.point[0]), d.dot(set.point[1])) > kLeaning * tolerance;
+  if (leans) set.count = 1;
+  return set;
 }
 
 // One attempt at a pair's polygon with a given face as the reference.
@@ -209,8 +215,8 @@ class FaceContact {
   // How far all points of both bodies may go while something of whatever may lie over the reference face is
   // sure to be higher than `most`, so that make() fails; 0 where that is not seen.
   double room(double most) {
-    set_window();
     double least = face_room(opposite(), most);
+    if (!(least > 0)) return 0;
     for (const StraightEdge& edge : incident_.shape->flats.edges) {
       if (!(least > 0)) return 0;
       least = std::min(least,
@@ -224,7 +230,6 @@ class FaceContact {
 
   // `swallowed`: the reference face lies inside the incident one.
   bool make(double overlap, double reach, ContactPolygon* out, bool* swallowed) {
-    set_window();
     *swallowed = false;
     const double most = reach - overlap;
     if (!face_points(most, swallowed) && !crease_points(most) && !line_points(most)) return false;
@@ -249,9 +254,11 @@ class FaceContact {
                                  : crossing_id(side_of_incident, side_of_reference);
   }
 
-  void set_window() {
-    window_.count = 0;
-    for (const int v : face_.outline) window_.add(plane_.project(reference_.place(reference_.vertex(v))));
+  // The reference's outline.
+  const ConvexPolygon& window() const {
+    if (window_.count == 0)
+      for (const int v : face_.outline) window_.add(plane_.project(reference_.place(reference_.vertex(v))));
+    return window_;
   }
 
   // The incident face opposite the reference, in the reference plane.
@@ -259,7 +266,6 @@ class FaceContact {
     int face;  // -1: none
     Vec3 normal;
     double level;
-    ConvexPolygon outline;
   };
   // Counterclockwise seen from the incident body's outside is clockwise about the reference's normal.
   static int vertex(const FlatFace& face, int i) {
@@ -272,8 +278,6 @@ class FaceContact {
     o.face = nearest_face(flats, down(), kFaceCosine);
     if (o.face < 0) return o;
     const FlatFace& face = flats.faces[o.face];
-    for (int i = 0; i < static_cast<int>(face.outline.size()); ++i)
-      o.outline.add(plane_.project(incident_.place(incident_.vertex(vertex(face, i)))));
     o.normal = incident_.turned(face.normal);
     o.level = incident_.frame.scale * face.offset - o.normal.dot(plane_.origin - incident_.frame.x);
     return o;
@@ -285,23 +289,31 @@ class FaceContact {
            plane_.level;
   }
 
+  // How far inside the two outlines a place of the reference plane is, along that at least.
+  double inside_reference(const Vec2& at) const {
+    const double scale = reference_.frame.scale;
+    return scale * face_.sides.depth_inside(at / scale);
+  }
+  double inside(const Opposite& o, const Vec2& at, double over) const {
+    const FlatFace& face = incident_.shape->flats.faces[o.face];
+    const Vec3 on_face = incident_.to_shape(plane_.lift(at, over));
+    return -o.normal.dot(plane_.normal) * incident_.frame.scale *
+           face.sides.depth_inside(face.project(on_face));
+  }
+
   // Of room(): the face opposite is either elsewhere, or has a place over the reference that is high.
   double face_room(const Opposite& o, double most) const {
     if (o.face < 0) return kInfinite;
+    const FlatFace& face = incident_.shape->flats.faces[o.face];
     const Vec2 middle = plane_.project(reference_.place(face_.centroid)),
-               other = plane_.project(incident_.place(incident_.shape->flats.faces[o.face].centroid));
-    const auto radius = [](const ConvexPolygon& p, const Vec2& centre) {
-      double most2 = 0;
-      for (int i = 0; i < p.count; ++i) most2 = std::max(most2, (p.corner[i] - centre).squaredNorm());
-      return std::sqrt(most2);
-    };
-    double best = (middle - other).norm() - radius(window_, middle) - radius(o.outline, other);
+               other = plane_.project(incident_.place(face.centroid));
+    double best =
+        (middle - other).norm() - reference_.frame.scale * face_.radius - incident_.frame.scale * face.radius;
     if (best > 0) return best;
     for (const double t : {0.0, 0.5, 1.0}) {
       const Vec2 at = middle + t * (other - middle);
-      const double high = height(o, at) - most;
-      if (high > best)
-        best = std::max(best, std::min({high, depth_inside(window_, at), depth_inside(o.outline, at)}));
+      const double over = height(o, at), high = over - most;
+      if (high > best) best = std::max(best, std::min({high, inside_reference(at), inside(o, at, over)}));
     }
     return std::max(best, 0.0);
   }
@@ -312,10 +324,10 @@ class FaceContact {
     if (best > 0) return best;
     const Vec2 at_p = plane_.project(p), at_q = plane_.project(q);
     SegmentPart part;
-    if (!clip_segment(window_, at_p, at_q, slack_, &part)) return 0;
+    if (!clip_segment(window(), at_p, at_q, slack_, &part)) return 0;
     for (const double s : {0.1, 0.5, 0.9}) {
       const double t = part.t0 + s * (part.t1 - part.t0), high = gap_p + t * (gap_q - gap_p) - most;
-      if (high > best) best = std::max(best, std::min(high, depth_inside(window_, at_p + t * (at_q - at_p))));
+      if (high > best) best = std::max(best, std::min(high, inside_reference(at_p + t * (at_q - at_p))));
     }
     return std::max(best, 0.0);
   }
@@ -324,7 +336,10 @@ class FaceContact {
     const Opposite o = opposite();
     if (o.face < 0 || face_room(o, most) > 0) return false;
     const FlatFace& face = incident_.shape->flats.faces[o.face];
-    const ConvexPolygon cut = intersect(o.outline, window_, slack_);
+    ConvexPolygon outline;
+    for (int i = 0; i < static_cast<int>(face.outline.size()); ++i)
+      outline.add(plane_.project(incident_.place(incident_.vertex(vertex(face, i)))));
+    const ConvexPolygon cut = intersect(outline, window(), slack_);
     if (cut.count < 3) return false;
     points_.plane.count = 0;
     whole_ = true;
@@ -367,7 +382,7 @@ class FaceContact {
     if (std::min(gap_p, gap_q) > most) return false;
     const Vec2 at_p = plane_.project(p), at_q = plane_.project(q);
     SegmentPart part;
-    if (!clip_segment(window_, at_p, at_q, slack_, &part)) return false;
+    if (!clip_segment(window(), at_p, at_q, slack_, &part)) return false;
     out->plane.count = 0;
     const auto add = [&](double t, int side, int end) {
       const std::uint32_t id = vertex[end] < 0 ? 0
@@ -415,7 +430,8 @@ class FaceContact {
   bool line_points(double most) {
     RuledLine line;
     Vec3 support;
-    if (!incident_line(&line, &support) || !lies_on(*incident_.shape, support, line.ends[0], line.ends[1]) ||
+    if (!incident_line(&line, &support) ||
+        !is_on_line(*incident_.shape, support, line.ends[0], line.ends[1]) ||
         !segment(line.ends, {-1, -1}, most, &points_, &whole_))
       return false;
     ruled_ = true;
@@ -425,7 +441,7 @@ class FaceContact {
   void set_room(ContactPolygon* out) const {
     int i = 0, j = 0;
     double room = kSlideShare * size_of(points_.plane, &i, &j);
-    if (whole_) room = std::max(room, depth_inside(window_, points_.plane));
+    if (whole_) room = std::max(room, depth_inside(window(), points_.plane));
     out->room = room;
   }
 
@@ -434,7 +450,7 @@ class FaceContact {
   const Body& incident_;
   ReferencePlane plane_;
   double slack_;
-  ConvexPolygon window_;  // the reference's outline
+  mutable ConvexPolygon window_;  // made when it is first asked for
   Candidates points_;
   bool whole_ = false;  // every point is the incident body's own
   bool ruled_ = false;
@@ -450,7 +466,7 @@ struct Line {
 // A crease or ruled line that supports the body in lab direction d, to `tolerance`.
 bool support_line(const Body& body, const Vec3& d, double tolerance, Line* line) {
   const SupportSet set = support_set(*body.shape, body.turned_back(d), tolerance / body.frame.scale);
-  if (set.count != 2 || (set.ruled && !lies_on(*body.shape, set.support, set.point[0], set.point[1])))
+  if (set.count != 2 || (set.ruled && !is_on_line(*body.shape, set.support, set.point[0], set.point[1])))
     return false;
   for (int i = 0; i < 2; ++i) {
     line->ends[i] = body.place(set.point[i]);
@@ -480,9 +496,41 @@ LinePair pair_of(const Line& a, const Line& b, const Vec3& d) {
   return lines;
 }
 
-// Two parallel lines. `room`, where there are none: how far points may go before there may be.
-bool line_contact(const Body& a, const Body& b, const Vec3& d, double overlap, double reach,
-                  const SurfacePoint* starts, ContactPolygon* out, double* room) {
+// The direction across u, near d, along which two bodies overlap least: where the points furthest along it
+// lie over each other. By secants, kept between sides once both are known.
+Vec3 least_across(const Body& a, const Body& b, const Vec3& u, const Vec3& d) {
+  const Vec3 middle = (d - d.dot(u) * u).normalized(), side = u.cross(middle);
+  const double size = a.radius() + b.radius();
+  const auto along = [&](double angle) -> Vec3 { return std::cos(angle) * middle + std::sin(angle) * side; };
+  const auto slope = [&](double angle) {  // of the overlap
+    const Vec3 e = along(angle), x = a.place(find_hull_support(*a.shape, a.turned_back(e)).point),
+               y = b.place(find_hull_support(*b.shape, b.turned_back(-e)).point);
+    return (x - y).dot(u.cross(e));
+  };
+  double last = 0, at_last = slope(last), angle = std::clamp(-at_last / size, -kMostAcross, kMostAcross);
+  double low = at_last < 0 ? 0 : -kInfinite, high = at_last > 0 ? 0 : kInfinite;
+  for (int k = 0; k < kAcrossSteps && angle != last; ++k) {
+    const double here = slope(angle);
+    (here < 0 ? low : high) = angle;
+    if (std::abs(here) <= kRoundoff * size) break;
+    const double rate = (here - at_last) / (angle - last);
+    double next = rate > 0 ? angle - here / rate : angle - std::copysign(kMostAcross, here);
+    next = std::clamp(next, angle - kMostAcross, angle + kMostAcross);
+    if (!(next > low && next < high)) {
+      if (!(high - low < kInfinite)) break;
+      next = 0.5 * (low + high);
+    }
+    last = angle;
+    at_last = here;
+    angle = next;
+  }
+  return along(angle);
+}
+
+// Two parallel lines. `room`, where there are none: how far points may go before there may be. `rolls`: they
+// were so before, and the normal has turned with A, not to where the lines have gone.
+bool line_contact(const Body& a, const Body& b, Vec3 d, double overlap, double reach,
+                  const SurfacePoint* starts, bool rolls, ContactPolygon* out, double* room) {
   // Both bodies need a feature that lags no more than that behind their support.
   const auto lag = [](const Body& body, const Vec3& along, const SurfacePoint* start) {
     const Vec3 on_body = body.turned_back(along);
@@ -499,7 +547,12 @@ bool line_contact(const Body& a, const Body& b, const Vec3& d, double overlap, d
   if (*room > 0) return false;
   *room = 0;
   Line on_a, on_b;
-  if (!support_line(a, d, reach, &on_a) || !support_line(b, -d, reach, &on_b)) return false;
+  if (!support_line(a, d, reach, &on_a)) return false;
+  if (rolls) {
+    d = least_across(a, b, (on_a.ends[1] - on_a.ends[0]).normalized(), d);
+    if (!support_line(a, d, reach, &on_a)) return false;
+  }
+  if (!support_line(b, -d, reach, &on_b)) return false;
   const LinePair lines = pair_of(on_a, on_b, d);
   const ReferencePlane& plane = lines.plane;
   const double length = lines.length;
@@ -553,21 +606,10 @@ double clear_way(const Particle& particle, const Vec3& d, double reach, const Su
   return kWayShare * particle.scale * std::clamp(room, 0.0, kMostRoom * particle.shape->bounding_radius);
 }
 
-}  // namespace
-
-bool make_plane_polygon(const Particle& particle, const Vec3& origin, const Vec3& normal, double reach,
-                        ContactPolygon* out, double* clear) {
-  *out = {};
-  if (clear) *clear = 0;
+// make_plane_polygon() of a support set that is more than a point.
+bool stand_on_plane(const Particle& particle, const BodyFrame& frame, const SupportSet& set,
+                    const Vec3& origin, const Vec3& normal, double reach, ContactPolygon* out) {
   const Shape& shape = *particle.shape;
-  if (shape.flats.empty()) return false;
-  const BodyFrame frame = body_frame(particle);
-  const Vec3 d = frame.axes.transpose() * -normal;
-  const SupportSet set = support_set(shape, d, reach / frame.scale);
-  if (set.count < 2 || leans(shape, d, set, reach / frame.scale)) {
-    if (clear) *clear = clear_way(particle, d, reach, set);
-    return false;
-  }
   const auto height = [&](const Vec3& s) {
     return normal.dot(particle.x - origin + frame.scale * (frame.axes * s));
   };
@@ -594,6 +636,22 @@ bool make_plane_polygon(const Particle& particle, const Vec3& origin, const Vec3
   set_marks(plane_frame(origin), frame, out);
   out->rolling = set.ruled ? 1 : 0;
   return true;
+}
+
+}  // namespace
+
+bool make_plane_polygon(const Particle& particle, const Vec3& origin, const Vec3& normal, double reach,
+                        ContactPolygon* out, double* clear) {
+  *out = {};
+  if (clear) *clear = 0;
+  const Shape& shape = *particle.shape;
+  if (shape.flats.empty()) return false;
+  const BodyFrame frame = body_frame(particle);
+  const Vec3 d = frame.axes.transpose() * -normal;
+  const SupportSet set = standing_set(shape, d, reach / frame.scale);
+  if (set.count > 1) return stand_on_plane(particle, frame, set, origin, normal, reach, out);
+  if (clear) *clear = clear_way(particle, d, reach, set);
+  return false;
 }
 
 namespace {
@@ -706,14 +764,14 @@ RegionContact make_region_polygon(const Particle& particle, const PlaneRegion& r
     return RegionContact::polygon;
   };
   const Vec3 d = body.turned_back(-region.normal);
-  const SupportSet set = support_set(shape, d, reach / body.frame.scale);
-  if (set.count < 2 || leans(shape, d, set, reach / body.frame.scale)) {
+  const SupportSet set = standing_set(shape, d, reach / body.frame.scale);
+  if (set.count < 2) {
     if (clear) *clear = clear_way(particle, d, reach, set);
     return RegionContact::point;
   }
   const auto whole = [&](double room) {
-    if (!make_plane_polygon(particle, region.origin, region.normal, reach, out)) return RegionContact::point;
-    return placed(room);
+    const bool made = stand_on_plane(particle, body.frame, set, region.origin, region.normal, reach, out);
+    return made ? placed(room) : RegionContact::point;
   };
   if (!region.cells) return whole(kInfinite);
   const RegionClip clip(region, body.radius());
@@ -795,7 +853,8 @@ bool make_pair_polygon(const Particle& pa, const Particle& pb, const Vec3& norma
   }
   if (attempt(1 - first, out, &swallowed)) return true;
   double room = 0;
-  if (line_contact(a, b, normal, overlap, reach, starts, out, &room)) return true;
+  const bool rolls = old && old->count == 2 && old->rolling != 0;
+  if (line_contact(a, b, normal, overlap, reach, starts, rolls, out, &room)) return true;
   *out = {};
   if (!clear) return false;
   // Other faces may become the nearest ones.
@@ -924,6 +983,19 @@ double still_holds(const PolygonState& state, double support_gap, double radius_
 
 double stored_energy(const ContactPolygon& polygon, const PolygonState& state) {
   return polygon.factor * state.energy;
+}
+
+double energy_after_rolling(const ContactPolygon& old, const ContactPolygon& polygon,
+                            const PolygonState& state) {
+  const Vec3 from = load(polygon.point[0]), way = load(polygon.point[1]) - from;
+  PolygonState rolled = state;
+  rolled.energy = 0;
+  for (int i = 0; i < 2; ++i) {
+    const double t = (load(old.point[i]) - from).dot(way) / way.squaredNorm();
+    const double overlap = std::max(0.0, -(state.gap[0] + t * (state.gap[1] - state.gap[0])));
+    rolled.energy += 0.5 * old.weight[i] * overlap * overlap;
+  }
+  return stored_energy(old, rolled);
 }
 
 double continuity_factor(double energy, const ContactPolygon& polygon, const PolygonState& state) {

@@ -156,6 +156,12 @@ double still_holds(const PolygonState& state, double support_gap, double radius_
 
 // U / kn, the factor included.
 double stored_energy(const ContactPolygon& polygon, const PolygonState& state);
+
+// What `old` holds once its points have gone to the line where the new polygon of the same bodies lies, each
+// staying where it is along it: both are segments of ruled lines, and rolling costs nothing. `state` is the
+// new one's.
+double energy_after_rolling(const ContactPolygon& old, const ContactPolygon& polygon,
+                            const PolygonState& state);
 // The factor that gives the polygon the energy U / kn; 1 where one of the two has none.
 double continuity_factor(double energy, const ContactPolygon& polygon, const PolygonState& state);
 // Moves the factor to 1 by `share` in [0, 1] of its distance; returns the change of U / kn.

@@ -3,6 +3,7 @@
 
 #include <cmath>
 
+#include "body/flat_faces.h"
 #include "contact/sphere_search.h"
 
 namespace nurbs {
@@ -19,11 +20,17 @@ SurfaceCurvature ellipsoid_curvature(const Particle& particle, const Vec3& outwa
   return {h / particle.scale * (across * m * across), true};
 }
 
-}  // namespace
+// Squared angle (rad) within which a contact's normal is a flat face's, with the errors of searches.
+constexpr double kFaceAngle2 = 1e-4 * 1e-4;
+
+bool meets_face(const Particle& particle, const Vec3& outward, double angle2) {
+  const FlatFeatures& flats = particle.shape->flats;
+  return !flats.faces.empty() && nearest_face(flats, particle.q.conjugate() * outward, 1 - 0.5 * angle2) >= 0;
+}
 
 // II in the orthonormal frame (t, s): J^-T II J^-1, with J = (lu, t.sv; 0, s.sv) from parameters to the
 // frame.
-SurfaceCurvature curvature_at(const Particle& particle, const PointMemory& point, const Vec3& outward) {
+SurfaceCurvature curvature_of_patch(const Particle& particle, const PointMemory& point, const Vec3& outward) {
   if (!(point.patch >= 0) && particle.shape->ellipsoid.found) return ellipsoid_curvature(particle, outward);
   if (!(point.patch >= 0)) {  // solved as a sphere, or not at all
     const Roundness round = roundness(*particle.shape);
@@ -59,6 +66,15 @@ SurfaceCurvature curvature_at(const Particle& particle, const PointMemory& point
              ss * lab_s * lab_s.transpose();
   c.known = c.tensor.allFinite();
   return c;
+}
+
+}  // namespace
+
+// What a search remembers of a flat face is any point of it: also one of its corners, on another patch.
+SurfaceCurvature curvature_at(const Particle& particle, const PointMemory& point, const Vec3& outward) {
+  if (meets_face(particle, outward, kFaceAngle2)) return plane_curvature();
+  const SurfaceCurvature c = curvature_of_patch(particle, point, outward);
+  return !c.known && meets_face(particle, outward, kCreaseAngle2) ? plane_curvature() : c;
 }
 
 SurfaceCurvature cylinder_curvature(const Vec3& origin, const Vec3& axis, double radius, const Vec3& point,

@@ -20,7 +20,8 @@ struct SurfaceCurvature {
 };
 
 // Of a body's surface at a point, from one evaluation (30 ns); `outward` is the contact's normal, away from
-// the body. At a pole it is that beside it, kBesidePole of the patch away.
+// the body. At a pole it is that beside it, kBesidePole of the patch away. Along a flat face's normal, and
+// where an edge leans from it by less than kCreaseAngle2, it is the face's, wherever on it the point may be.
 SurfaceCurvature curvature_at(const Particle& particle, const PointMemory& point, const Vec3& outward);
 inline SurfaceCurvature plane_curvature() {
   return {Mat3::Zero(), true};

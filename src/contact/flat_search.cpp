@@ -60,9 +60,7 @@ bool meet_face(const PairFrame& pair, const Vec3& direction, int owner, double t
   const Vec3 y = of_a ? pair.place_b(top.point) : pair.place_a(top.point);
   const Vec3 y_on_face = (of_a ? y : Vec3(pair.turn.transpose() * (y - pair.offset))) / scale;
 
-  ConvexPolygon outline;
-  for (const int v : face.outline) outline.add(face.project(flat.flats.vertices[v]));
-  const double inside = scale * depth_inside(outline, face.project(y_on_face));
+  const double inside = scale * face.sides.depth_inside(face.project(y_on_face));
   const double overlap = scale * (face.offset - face.normal.dot(y_on_face));
   if (!is_least(pair, n, overlap, inside)) return false;
   const Vec3 x = y + overlap * outward;

@@ -10,8 +10,6 @@ namespace {
 
 using Slot = JetLanes::Slot;
 
-constexpr double kTangentNoise = 4 * kRoundoff;  // of the body: round-off of a surface tangent
-
 // Both surfaces at the current parameters, in the pair frame.
 NURBS_INLINE void evaluate(const PairFrame& pair, const Mat3& frame_b, JointSolution& s) {
   s.base_a = s.points.on_a;

@@ -32,6 +32,12 @@ struct MetEdge {
   enum State { unknown, clear, along, before, beyond } state = unknown;  // beyond: past v[1]
 };
 
+// From the point of an edge that is nearest to x.
+Vec3 from_edge(const MeshPatch& patch, const MeshPatch::Edge& e, const Vec3& x) {
+  const Vec3 apart = x - patch.vertices()[e.v[0]].x;
+  return apart - std::clamp(apart.dot(e.direction), 0.0, e.length) * e.direction;
+}
+
 // Room that is used again by every search of a thread.
 struct Workspace {
   std::vector<ActivePlane> planes;
@@ -166,15 +172,10 @@ class SurfaceSearch {
   // Whether a flat feature of the body stands on the plane, over a part of it that is wall.
   bool stand_on(int number) {
     const ActivePlane& met = planes_[number];
-    if (met.stands) {
-      add_plane(number, patch_.unbounded() ? 0 : patch_.planes()[number].leader, true, met.result.gap,
-                met.deepest);
-      return true;
-    }
-    bool stands = false;
+    bool stands = met.stands;
     for (int k = 0; k < former_count_ && !stands; ++k)
       stands = former_[k].flat && former_[k].normal.dot(met.normal) > kSamePlane;
-    const bool unbounded = patch_.unbounded(), over = unbounded || cell_below(number) >= 0;
+    const bool unbounded = patch_.unbounded(), over = met.stands || unbounded || cell_below(number) >= 0;
     const int triangle = unbounded ? 0 : patch_.planes()[number].leader;
     if (!stands) {
       // Where several planes of about one slope are met, the surface is bent under the body, and its features
@@ -429,9 +430,7 @@ class SurfaceSearch {
     }
     if (weight == 0) return;
     const Vec3& a = patch_.vertices()[e.v[0]].x;
-    const Vec3 apart = particle_.x - a;
-    const Vec3 way = apart - std::clamp(apart.dot(e.direction), 0.0, e.length) * e.direction;
-    if (way.squaredNorm() > radius_ * radius_) {
+    if (from_edge(patch_, e, particle_.x).squaredNorm() > radius_ * radius_) {
       edges_[number].state = MetEdge::clear;
       return;
     }
@@ -632,9 +631,7 @@ double one_face_until(const Particle& particle, const MeshPatch& patch, double p
   const double radius = particle.scale * particle.shape->bounding_radius;
   for (int i = plane.first_edge; i < plane.first_edge + plane.edges && until > path; ++i) {
     const MeshPatch::Edge& e = patch.edges()[patch.edge_in(i)];
-    const Vec3 apart = particle.x - patch.vertices()[e.v[0]].x;
-    const double along = std::clamp(apart.dot(e.direction), 0.0, e.length);
-    until = std::min(until, path + (1 - 1e-12) * (apart - along * e.direction).norm() - radius);
+    until = std::min(until, path + (1 - 1e-12) * from_edge(patch, e, particle.x).norm() - radius);
   }
   return until;
 }

@@ -51,8 +51,9 @@ struct alignas(64) ContactBlock {
     for (int k = 0; k < count; ++k) values[k] = field[first + k][lane];
   }
   void set(int lane, int first, int count, const void* from) {
-    const double* values = static_cast<const double*>(from);
-    for (int k = 0; k < count; ++k) field[first + k][lane] = values[k];
+    const char* values = static_cast<const char*>(from);
+    for (int k = 0; k < count; ++k)
+      std::memcpy(&field[first + k][lane], values + k * sizeof(double), sizeof(double));
   }
 };
 static_assert(sizeof(ContactBlock) <= kBlock * 640, "a contact's memory");
@@ -124,6 +125,9 @@ class ContactPool {
   // The polygon of a contact, or nullptr.
   FlatContact* flat(std::int32_t number) { return flat_of(block(number), lane(number)); }
   FlatContact* flat_of(const ContactBlock& block, int lane) {
+    return const_cast<FlatContact*>(std::as_const(*this).flat_of(block, lane));
+  }
+  const FlatContact* flat_of(const ContactBlock& block, int lane) const {
     const int index = static_cast<int>(block.field[kFlat][lane]);
     return index == 0 ? nullptr : &flats_[index - 1];
   }

@@ -11,6 +11,7 @@
 
 #include <array>
 #include <deque>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -66,11 +67,11 @@ struct WallContact {
   double weight = 1;     // +1, or below 0: what other contacts count twice
   Vec3 velocity = Vec3::Zero(), spin = Vec3::Zero();  // of the wall at point_a; lab
   int mark = 0;                                       // the caller's
-  bool face =
-      false;  // at a point of a plane that stands still: a contact that goes on there follows by itself
-  PlaneRegion* region = nullptr;  // that a flat feature of the body stands on, until the end of the step
-  std::uint64_t name = 0;         // of the piece of the wall
-  double path = 0;                // of the body and the wall together, as Bodies::path
+  // At a point of a plane that stands still: a contact that goes on there follows by itself.
+  bool face = false;
+  std::optional<PlaneRegion> region;  // that a flat feature of the body stands on, until the end of the step
+  std::uint64_t name = 0;             // of the piece of the wall
+  double path = 0;                    // of the body and the wall together, as Bodies::path
   PairMemory memory;
 };
 
@@ -261,11 +262,11 @@ class ContactStages {
     std::int32_t next = 0;  // contact of the same body
     int mark = 0;
     bool seen = false;
-    double body[3] = {};                  // where the body was in the last step
-    const PlaneRegion* region = nullptr;  // of this step
-    double path = 0;                      // of wall and body
-    double normal[3] = {};                // of the face that the contact follows by itself, through record.x
-    bool follows = false;                 // it does
+    double body[3] = {};                // where the body was in the last step
+    std::optional<PlaneRegion> region;  // of this step
+    double path = 0;                    // of wall and body
+    double normal[3] = {};              // of the face that the contact follows by itself, through record.x
+    bool follows = false;               // it does
     // Of balanced contacts.
     std::uint64_t name = 0;  // of the piece of the wall
     double level = 0;        // normal . wall's point

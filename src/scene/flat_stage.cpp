@@ -52,7 +52,7 @@ void take_over(const ContactCoefficients& law, const ContactGeometry& g, const B
 }
 
 bool ContactStages::may_be_flat(int a, int b) const {
-  if (a < -1) return partners_[-2 - a].region != nullptr && step_.settings.solver == Solver::ladder;
+  if (a < -1) return partners_[-2 - a].region.has_value() && step_.settings.solver == Solver::ladder;
   return record(b).flat != 0 && (a < 0 || record(a).flat != 0) && step_.settings.solver == Solver::ladder;
 }
 
@@ -85,8 +85,8 @@ bool ContactStages::find_polygon(int a, int b, const Vec3& normal, double overla
                                  const SurfacePoint* starts) const {
   const Particle body = step_.bodies->particle(b);
   if (a < -1) {
-    const PlaneRegion* region = partners_[-2 - a].region;
-    return region != nullptr &&
+    const std::optional<PlaneRegion>& region = partners_[-2 - a].region;
+    return region.has_value() &&
            make_region_polygon(body, *region, wall_frame(a), reach, polygon, clear) ==
                RegionContact::polygon &&
            polygon->count >= 2;
@@ -183,11 +183,11 @@ bool ContactStages::serve_flat(ContactBlock& block, int lane, LeftPolygon* left)
     bool stays = verdict != PolygonVerdict::open;
     double overlap = -state.least;
     if (stays) {
-      const bool rolls = flat.polygon.rolling != 0;  // and is remade in any case
-      const double deepest = rolls ? state.least
-                             : block.fresh[lane] != 0  // the caller has sought it
-                                 ? fresh_[block.fresh[lane] - 1].gap
-                                 : support_gap(flat.polygon, a < 0 ? nullptr : &first, body, wall_frame(a));
+      double deepest = state.least;
+      if (flat.polygon.rolling == 0)      // one that rolls is remade in any case
+        deepest = block.fresh[lane] != 0  // the caller has sought it
+                      ? fresh_[block.fresh[lane] - 1].gap
+                      : support_gap(flat.polygon, a < 0 ? nullptr : &first, body, wall_frame(a));
       if (verdict == PolygonVerdict::moved || outgrown(state, deepest)) {
         overlap = std::max(overlap, -deepest);
         stays = remake(block, lane, flat, state, overlap);
@@ -235,8 +235,13 @@ bool ContactStages::remake(ContactBlock& block, int lane, FlatContact& flat, Pol
   if (!find_polygon(a, b, state.normal, overlap, kKeptReach * overlap, &flat.polygon, &polygon)) return false;
   polygon.factor = flat.polygon.factor;
   const PolygonState fresh = now(polygon, *step_.bodies, wall_frame(a), a, b);
-  // Springs keep their energy; what would make them too stiff they lose, which is booked.
-  const double held = stored_energy(flat.polygon, state), holds = stored_energy(polygon, fresh);
+  // Springs keep their energy; what would make them too stiff they lose, which is booked. An old line that
+  // rolled has left the place where it bore.
+  const bool rolls = flat.polygon.rolling != 0 && polygon.rolling != 0 && flat.polygon.count == 2 &&
+                     polygon.count == 2 && flat.polygon.reference == polygon.reference;
+  const double held =
+      rolls ? energy_after_rolling(flat.polygon, polygon, fresh) : stored_energy(flat.polygon, state);
+  const double holds = stored_energy(polygon, fresh);
   if (holds > 0)
     polygon.factor = std::min(polygon.factor * held / holds, std::max(kStiffest, polygon.factor));
   int source[kContactPoints];

@@ -105,7 +105,6 @@ void SurfaceWall::find(const ContactStages::Step& step, const std::vector<Triang
   still_ = kind_ == Kind::mesh && path_ == 0 &&
            std::all_of(meshes.begin(), meshes.end(), [](const TriangleArray& m) { return !m.velocity; });
   overflows_ = 0;
-  regions_used_ = 0;
   if (step.bodies->reshaped()) {
     std::fill(expiry_.begin(), expiry_.end(), -kFarAway);
     std::fill(stay_.begin(), stay_.end(), -kFarAway);
@@ -151,13 +150,9 @@ void SurfaceWall::find_for(int body, const ContactStages::Step& step,
     WallContact& f = found_[k];
     f.weight = c.weight;
     f.name = name_of(c, body, meshes);
-    f.region = nullptr;
+    f.region.reset();
     f.face = still_ && c.piece == SurfaceContact::face;
-    if (c.flat) {
-      if (regions_used_ == regions_.size()) regions_.emplace_back();
-      regions_[regions_used_] = plane_region(patches_[patch_of_[body]]->mesh, c.plane, particle.x);
-      f.region = &regions_[regions_used_++];
-    }
+    if (c.flat) f.region = plane_region(patches_[patch_of_[body]]->mesh, c.plane, particle.x);
     f.path = step.bodies->path()[body] + path_;
     f.memory = c.memory;
     ContactResult& r = f.result;

@@ -96,8 +96,6 @@ class SurfaceWall {
   std::vector<Triangle> triangles_;
   SurfaceContacts contacts_;
   WallContact found_[kSurfaceContacts];
-  std::deque<PlaneRegion> regions_;  // that flat features stand on, of this step: the first regions_used_
-  std::size_t regions_used_ = 0;
   PairMemory former_memories_[ContactStages::kMostListed];
 };
 

@@ -104,8 +104,7 @@ bool ContactStages::same_piece(std::int32_t number, int body, const WallContact&
   const int lane = ContactPool::lane(number);
   block.get(lane, kStateField, kContactStateSize, &state);
   Vec3 normal = load(state.normal);
-  if (const double flat = block.field[kFlat][lane])
-    normal = load(pool_.flats()[static_cast<int>(flat) - 1].polygon.normal);
+  if (const FlatContact* flat = pool_.flat_of(block, lane)) normal = load(flat->polygon.normal);
   // The plane as it was, or where the wall's motion has brought it since.
   const Vec3 x = load(p.record.x), velocity = found.velocity + found.spin.cross(x - found.result.point_a);
   const Vec3& now = found.result.normal;

@@ -51,11 +51,10 @@ int ContactStages::former(std::int32_t head, FormerContact* contacts, PairMemory
     PairMemory& m = memories[count];
     FormerContact& c = contacts[count++];
     c = {load(normal), &m, false};
-    if (const double number = block.field[kFlat][lane]) {
+    if (const FlatContact* flat = pool_.flat_of(block, lane)) {
       c.flat = true;
-      const FlatContact& points = pool_.flats()[static_cast<int>(number) - 1];
-      c.polygon = &points.polygon;
-      c.until = points.points.until[0];
+      c.polygon = &flat->polygon;
+      c.until = flat->points.until[0];
       c.normal = load(c.polygon->normal);
       c.frame = load(partner(head).record.x);
     }
@@ -100,7 +99,7 @@ void ContactStages::update_listed(std::int32_t number, int body, const WallConta
 // Whether a contact that goes on can be followed by itself, as a neighbour's: it is at a point of a plane
 // that stands still, passes through the contact's fixed point, and is the one its memory is of.
 bool ContactStages::may_follow(std::int32_t number, int body, const WallContact& found) const {
-  if (!found.face || found.weight < 0 || found.region != nullptr || step_.bodies->reshaped()) return false;
+  if (!found.face || found.weight < 0 || found.region.has_value() || step_.bodies->reshaped()) return false;
   const Partner& p = partner(number);
   const ContactBlock& block = pool_.blocks()[(number - 1) / kBlock];
   const int lane = ContactPool::lane(number);

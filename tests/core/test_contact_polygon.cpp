@@ -580,9 +580,12 @@ TEST(PairPolygon, where_there_is_none_there_is_none_on_the_clear_way) {
   EXPECT_GT(facing, 2000);
 }
 
-TEST(PlanePolygon, where_there_is_none_there_is_none_on_the_clear_way) {
+// Poses a little into the plane z = 0 that `polygon_of(particle, reach, &clear)` finds none for are moved by
+// nearly the way it calls clear, as far as there is one; how many moved ones there were to ask.
+template <class PolygonOf>
+int expect_none_on_the_clear_way(int seed, PolygonOf polygon_of) {
   const std::vector<ShapePointer> shapes = flat_shapes();
-  Random random(22);
+  Random random(seed);
   int asked = 0;
   for (int n = 0; n < 3000; ++n) {
     Particle p;
@@ -595,23 +598,49 @@ TEST(PlanePolygon, where_there_is_none_there_is_none_on_the_clear_way) {
     const auto lowest = [&] {
       return p.x[2] - p.scale * find_support(*p.shape, p.q.conjugate() * -Vec3::UnitZ()).h;
     };
-    const auto has_one = [&](double* clear) {
-      ContactPolygon polygon;
-      return make_plane_polygon(p, Vec3::Zero(), Vec3::UnitZ(), -kReach * lowest(), &polygon, clear);
-    };
     p.x[2] -= lowest() + random.log_uniform(1e-5, 1e-2);
     double clear = 0;
-    if (has_one(&clear)) continue;
+    if (polygon_of(p, -kReach * lowest(), &clear)) continue;
     const Particle start = p;
     for (int k = 0; k < 8 && clear > 0; ++k) {
       p = start;
       move(random, 0.999 * clear, &p);
       if (!(lowest() < 0)) continue;
       ++asked;
-      EXPECT_FALSE(has_one(nullptr)) << p.shape->name << ", " << n << ": " << clear;
+      EXPECT_FALSE(polygon_of(p, -kReach * lowest(), nullptr)) << p.shape->name << ", " << n << ": " << clear;
     }
   }
+  return asked;
+}
+
+TEST(PlanePolygon, where_there_is_none_there_is_none_on_the_clear_way) {
+  const int asked = expect_none_on_the_clear_way(22, [](const Particle& p, double reach, double* clear) {
+    ContactPolygon polygon;
+    return make_plane_polygon(p, Vec3::Zero(), Vec3::UnitZ(), reach, &polygon, clear);
+  });
   EXPECT_GT(asked, 4000);
+}
+
+// Over all of a plane, and over a table whose border runs beneath the bodies: two cells that share a side.
+TEST(RegionPolygon, where_there_is_none_there_is_none_on_the_clear_way) {
+  PlaneCells table;
+  const Vec3 corners[] = {{-0.3, -0.2, 0}, {4, -0.2, 0}, {4, 4, 0}, {-0.3, 4, 0}};
+  for (const int k : {0, 1, 2, 0, 2, 3}) table.corners.push_back(corners[k]);
+  table.ends = {3, 6};
+  for (int k = 0; k < 4; ++k) table.border.insert(table.border.end(), {corners[k], corners[(k + 1) % 4]});
+  int found[3] = {};
+  for (const PlaneCells* cells :
+       {static_cast<const PlaneCells*>(nullptr), static_cast<const PlaneCells*>(&table)}) {
+    const PlaneRegion region = {Vec3(0.1, 0.2, 0), Vec3::UnitZ(), cells};
+    const int asked = expect_none_on_the_clear_way(23, [&](const Particle& p, double reach, double* clear) {
+      ContactPolygon polygon;
+      const RegionContact contact = make_region_polygon(p, region, p.x, reach, &polygon, clear);
+      if (clear) ++found[static_cast<int>(contact)];
+      return contact == RegionContact::polygon;
+    });
+    EXPECT_GT(asked, 4000);
+  }
+  for (const int count : found) EXPECT_GT(count, 50);  // points, features beside the region, polygons
 }
 
 TEST(ContactPolygon, is_plain_data) {

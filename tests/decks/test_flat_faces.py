@@ -4,16 +4,20 @@ import json
 import sys
 import unittest
 from pathlib import Path
+from random import Random
 
 import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parent))
 import deck  # noqa: E402
+import meshes  # noqa: E402
+import models  # noqa: E402
 
 G = 9.81
 DENSITY = 2500.0
 HALF = (0.5, 0.4, 0.3)  # half edges of the box
 MASS = DENSITY * 8 * np.prod(HALF)
+FLOOR = "plane 0 0 0 0 0 1"
 LAW = "kn 2e7 kt 1e7 cn 8e4 ct 4e4 mu 0.5"
 DECK = """
 units si
@@ -24,7 +28,7 @@ atom_style nurbs {shapes}
 read_data bodies.data
 {before}
 neighbor 0.05 bin
-neigh_modify delay 0
+neigh_modify delay 0 {rebuild}
 pair_style gran/nurbs
 pair_coeff * * {law}
 fix floor all wall/nurbs {wall} {law}
@@ -55,15 +59,15 @@ def turned(axis, degrees):
 
 
 def run(atoms, steps, velocities=(), gravity="0 0 -1", law=LAW, dt=5e-5, every=None, ranks=1, shape=None, before="",
-        mesh=None):
+        mesh=None, rebuild=""):
     files = {"box.json": shape or deck.shape_file("box", *HALF),
              "bodies.data": deck.data_file(atoms, velocities, ((-3, 3), (-3, 3), (-1, 6)))}
-    wall = "plane 0 0 0 0 0 1"
+    wall = FLOOR
     if mesh is not None:
         files["floor.stl"] = mesh
         before += "\nfix m all mesh/surface file floor.stl type 1"
         wall = "mesh m"
-    return deck.run_ok(DECK.format(shapes="box.json", wall=wall, law=law, gravity=gravity, dt=dt, steps=steps, before=before,
+    return deck.run_ok(DECK.format(shapes="box.json", wall=wall, law=law, gravity=gravity, dt=dt, steps=steps, before=before, rebuild=rebuild,
                                    every=every or max(1, steps // 20)), files=files, ranks=ranks)
 
 
@@ -109,10 +113,7 @@ class Rest(unittest.TestCase):
         # Leaning, it stands on a rim, beside the band; on a mesh as on a plane.
         tablet = deck.shape_file("tablet", 0.5, height=0.4, rim=0.05)
         mass = DENSITY * np.pi * 0.5**2 * 0.4
-        corners = [(-3, -3, 0), (3, -3, 0), (3, 3, 0), (-3, 3, 0)]
-        facets = "".join("facet normal 0 0 1\nouter loop\n" + "".join("vertex %g %g %g\n" % corners[k] for k in t) +
-                         "endloop\nendfacet\n" for t in ((0, 1, 2), (0, 2, 3)))
-        floor = f"solid s\n{facets}endsolid s\n"
+        floor = meshes.ascii_stl([(-3, -3, 0), (3, -3, 0), (3, 3, 0), (-3, 3, 0)], [(0, 1, 2), (0, 2, 3)])
         for lean in (0.1, 0.5, 3):
             for mesh in (None, floor):
                 r = run([atom(1, (0, 0, 0.51), turned((1, 0, 0), 90 - lean))], 200000, shape=tablet, mesh=mesh)
@@ -172,8 +173,8 @@ class Heap(unittest.TestCase):
                            ("north", "0 2.5 0 0 -1 0")))
         files = {"box.json": deck.shape_file("box", *HALF), "cylinder.json": cylinder(0.4, 0.3),
                  "bodies.data": deck.data_file(atoms, (), ((-3, 3), (-3, 3), (-1, 8)))}
-        r = deck.run_ok(DECK.format(shapes="box.json cylinder.json", wall="plane 0 0 0 0 0 1", law=LAW, gravity="0 0 -1", dt=5e-5, steps=24000,
-                                    every=1000, before=walls), files=files)
+        r = deck.run_ok(DECK.format(shapes="box.json cylinder.json", wall=FLOOR, law=LAW, gravity="0 0 -1", dt=5e-5,
+                                    steps=24000, every=1000, before=walls, rebuild=""), files=files)
         ledger, lost = r.thermo["ledger"], r.thermo["led[3]"][-1] + r.thermo["led[4]"][-1]
         print(f"    heap: ledger off by {np.ptp(ledger) / lost:.1e} of what is dissipated,"
               f" at most {(ledger - ledger[0]).max() / lost:.1e} gained", flush=True)
@@ -303,6 +304,52 @@ class Sliding(unittest.TestCase):
         self.assertLess(r.thermo["kinetic"][-1] / (0.5 * MASS * speed**2), 1e-8)
 
 
+class Rolling(unittest.TestCase):
+    def bounce(self, spin, law, off=0.0):
+        """Two cylinders that fly, axes along y, bounce off each other sideways; the first spins. Their relative velocity
+        at the end, spins, and the largest change of the ledger over the first kinetic energy."""
+        side = turned((1, 0, 0), 90)
+        x = np.sqrt(0.8005**2 - off**2)
+        r = run([atom(1, (0, 0, 3), side), atom(2, (x, 0, 3 + off), side)], 2500, dt=2e-5, shape=cylinder(0.4, 0.3), law=law,
+                velocities=[(1, 0, 0, 0, 0, spin, 0), (2, -0.5, 0, 0, 0, 0, 0)])
+        last = r.dump("out.dump")[-1][1]
+        ledger = np.array(r.thermo["ledger"])
+        v = np.array([last[name][1] - last[name][0] for name in ("vx", "vy", "vz")])
+        return v, np.array(last["omegay"]), np.ptp(ledger) / r.thermo["kinetic"][0]
+
+    def test_lines_follow_the_bodies_and_do_not_turn_with_them(self):
+        for spin in (0.0, 20.0):
+            v, omega, ledger = self.bounce(spin, "kn 2e6 kt 1e6 cn 0 ct 0 mu 0")
+            np.testing.assert_allclose(v, (0.5, 0, 0), rtol=0, atol=1e-6)  # nothing but the normal impulse
+            np.testing.assert_allclose(omega, (spin, 0), rtol=0, atol=1e-9)
+            self.assertLess(ledger, 1e-6)
+
+    def test_a_rolling_cylinder_does_not_sink(self):
+        mass = DENSITY * np.pi * 0.4**2 * 0.6
+        for spin in (5.0, 20.0):
+            law = LAW.replace("cn 8e4 ct 4e4", "cn 0 ct 0")
+            r = run([atom(1, (-2, 0, 0.4 - sunk(mass)), turned((1, 0, 0), 90))], 4000, shape=cylinder(0.4, 0.3), law=law, every=50,
+                    velocities=[(1, 0.4 * spin, 0, 0, 0, spin, 0)])
+            z = np.array([f["z"][0] for _, f in r.dump("out.dump")])
+            np.testing.assert_allclose(0.4 - z, sunk(mass), rtol=1e-6)
+
+    def test_an_oblique_bounce_is_a_mirror(self):
+        v, _, ledger = self.bounce(20.0, "kn 2e6 kt 1e6 cn 0 ct 0 mu 0", off=0.5)
+        n = np.array([np.sqrt(0.8005**2 - 0.25), 0, 0.5]) / 0.8005
+        before = np.array([-0.5, 0, 0])
+        # The normal turns by some 0.02 rad while they touch.
+        np.testing.assert_allclose(v, before - 2 * n.dot(before) * n, rtol=0, atol=0.02)
+        self.assertAlmostEqual(np.linalg.norm(v), 0.5, delta=1e-5)
+        self.assertLess(ledger, 1e-5)
+
+    def test_friction_between_spinning_cylinders_keeps_the_ledger(self):
+        v, omega, ledger = self.bounce(20.0, "kn 2e6 kt 1e6 cn 0 ct 0 mu 0.3")
+        inertia = 0.5 * 0.4**2  # over mass: each loses and gains spin by the same moment of the friction
+        self.assertAlmostEqual(omega.sum(), 20 - 0.4 / inertia * abs(v[2]), delta=0.04)  # arms: 0.4 less half the overlap
+        self.assertLess(omega[1], -0.1)
+        self.assertLess(ledger, 1e-4)
+
+
 class Ranks(unittest.TestCase):
     def test_the_same_on_two_ranks(self):
         atoms = [atom(k + 1, (1.3 * (k % 2) - 0.6, 0.3 * (k // 2), 0.4 + 0.75 * (k // 2)), turned((1, k, 2), 20 * k))
@@ -310,6 +357,69 @@ class Ranks(unittest.TestCase):
         one, two = (run(atoms, 20000, ranks=n).dump("out.dump")[-1][1] for n in (1, 2))
         for column in ("x", "y", "z", "vx", "omegaz"):
             np.testing.assert_array_equal(one[column], two[column])
+
+
+class Rebuilds(unittest.TestCase):
+    def test_lists_made_rarely_or_at_every_step_give_the_same_motion(self):
+        """Four bodies tumble into a heap: what is kept of polygons from one list to the next is what a search finds."""
+        atoms = [atom(1, (0, 0, 0.9), turned((1, 0.3, 0), 20)), atom(2, (0.2, 0.1, 1.9), turned((0, 1, 0.2), 5)),
+                 atom(3, (1.3, 0.2, 0.85), turned((0, 0, 1), 30)), atom(4, (0.6, 0.1, 3.0), turned((1, 0, 0), 80))]
+        thrown = [(1, 0.5, 0.0, 0.0, 0.1, 0.2, 0.3), (2, 0.0, 0.0, -1.0, 0.0, 0.0, 1.0), (3, -1.0, 0.0, 0.0, 0.0, 0.0, 0.0),
+                  (4, 0.0, 0.0, -1.0, 0.0, 2.0, 0.0)]
+        side = 6  # corners of a sheet's row
+        points = [(x, y, 0) for x in np.linspace(-2.9, 2.9, side) for y in np.linspace(-2.9, 2.9, side)]
+        cells = [k for k in range(side * (side - 1)) if k % side != side - 1]
+        sheet = meshes.ascii_stl(points, [t for k in cells for t in ((k, k + side, k + side + 1), (k, k + side + 1, k + 1))])
+        for shape in (None, cylinder(0.5, 0.4), deck.shape_file("tablet", radius=0.5, height=0.8, rim=0.1)):
+            for mesh in (None, sheet):
+                rare, often = (run(atoms, 4000, thrown, law="kn 2e6 kt 1e6 cn 8e3 ct 4e3 mu 0.5", dt=1e-4, shape=shape, mesh=mesh,
+                                   rebuild=rebuild) for rebuild in ("", "every 1 check no"))
+                self.assertIn("Neighbor list builds = 4000", often.screen)
+                self.assertNotIn("Neighbor list builds = 4000", rare.screen)
+                self.assertGreater(rare.thermo["st[8]"][-1], 8)  # polygons by then
+                last, other = rare.dump("out.dump")[-1][1], often.dump("out.dump")[-1][1]
+                for column in last:
+                    np.testing.assert_allclose(other[column], last[column], rtol=0, atol=1e-11)
+
+    def test_mixtures_on_a_shaken_floor_with_the_hosts_models(self):
+        """A tumbling box met an ellipsoid on its face with a force 9 % off, by the corner that a list had left in memory:
+        the effective radius was a corner's."""
+        draw, atoms, thrown, s = Random(3), [], [], 0.006
+        for k in range(1, 28):
+            x, y, z = (k - 1) // 3 % 3 - 1, (k - 1) % 3 - 1, (k - 1) // 9
+            scale, aside = s * draw.uniform(0.7, 1.0), draw.uniform(-0.1, 0.1) * s
+            q = np.array([draw.gauss(0, 1) for _ in range(4)])
+            atoms.append((k, 1 + k % 2, 1 + k % 4, scale, DENSITY, x * 2.3 * s + aside, y * 2.3 * s, (1.2 + 2.3 * z) * s,
+                          *map(float, q / np.linalg.norm(q))))
+            thrown.append((k, *(draw.uniform(-0.2, 0.2) for _ in range(3)), *(draw.uniform(-10, 10) for _ in range(3))))
+        files = {"pebble.json": deck.shape_file("pebble"), "tablet.json": deck.shape_file("tablet", radius=1, height=1, rim=0.2),
+                 "box.json": deck.box_shape(1, 0.8, 0.6), "ellipsoid.json": deck.shape_file("ellipsoid", 1, 1.25, 0.8),
+                 "bodies.data": deck.data_file(atoms, thrown, ((-0.06, 0.06), (-0.06, 0.06), (-0.005, 0.12)), 2)}
+        law = "model hertz tangential history"
+        text = f"""
+units si
+atom_style nurbs pebble.json tablet.json box.json ellipsoid.json
+boundary f f f
+newton off
+communicate single vel yes
+read_data bodies.data
+neighbor {{skin}} bin
+neigh_modify delay 0
+{models.materials(models.MATERIALS)}
+pair_style gran/nurbs {law}
+pair_coeff * *
+fix floor all wall/nurbs plane 0 0 0 0 0 1 type 1 {law} move wiggle amplitude 0 0 0.003 period 0.02
+fix weight all gravity 9.81 vector 0 0 -1
+fix motion all nve/nurbs
+timestep 2e-5
+run 2050
+dump d all custom 1 out.dump id x y z vx vy vz omegax omegay omegaz
+dump_modify d format "%d {' '.join(['%.17g'] * 9)}" sort id
+run 0
+"""
+        narrow, wide = (deck.run_ok(text.format(skin=skin), files=files).dump("out.dump")[-1][1] for skin in (0.003, 0.02))
+        for column in narrow:
+            np.testing.assert_allclose(wide[column], narrow[column], rtol=0, atol=1e-6)
 
 
 if __name__ == "__main__":
