@@ -222,6 +222,11 @@ void FixWallNurbs::init() {
     if (mesh.fix == nullptr)
       fail_all(FLERR, lmp,
                name_of(*this) + ": its fix mesh/surface " + mesh.id + " is gone; unfix the wall first");
+    // The host makes a fix of the same ID in the place of the one before, whose lists go with it.
+    if (modify->find_fix_id(("neighlist_" + std::string(id) + "_" + mesh.id).c_str()) != mesh.list)
+      fail_all(FLERR, lmp,
+               name_of(*this) + ": its fix mesh/surface " + mesh.id +
+                   " was made anew; unfix the wall before, and repeat its line behind the mesh's");
   }
   surface_.count_by_triangle(std::any_of(meshes_.begin(), meshes_.end(), [](const Mesh& mesh) {
     return mesh.fix->get_module("stress") != nullptr;
@@ -473,7 +478,8 @@ void FixWallNurbs::tell_meshes() {
 void FixWallNurbs::post_force(int) {
   const PairGranNurbs* pair = PairGranNurbs::find(lmp);
   nurbs::ContactStages::Step step;
-  step.bodies = pair != nullptr ? &bodies_->bodies() : &bodies_->update_bodies(freeze_groupbit_);
+  const bool first = pair == nullptr && all(lmp).front() == this;
+  step.bodies = first ? &bodies_->update_bodies(freeze_groupbit_) : &bodies_->bodies();
   step.owned = atom->nlocal;
   step.dt = update->dt;
   step.setup = update->setupflag != 0;

@@ -74,6 +74,7 @@ PairGranNurbs* PairGranNurbs::find(LAMMPS* lmp) {
 }
 
 void PairGranNurbs::settings(int narg, char** arg) {
+  require_alone();
   settings_ = nurbs_host::contacts_only();
   std::unique_ptr<nurbs_host::HostModels> models;
   for (int k = 0; k < narg; k += 2) {
@@ -149,8 +150,13 @@ void PairGranNurbs::coeff(int narg, char** arg) {
   if (!any) fail_all(FLERR, lmp, user + ": names no pair of types I <= J");
 }
 
-void PairGranNurbs::require_host_settings() {
+// The host makes a hybrid's parts, and reads their words, when the hybrid is the pair style already.
+void PairGranNurbs::require_alone() {
   if (force->pair != this) fail_all(FLERR, lmp, std::string(kUser) + " can't be part of a hybrid pair style");
+}
+
+void PairGranNurbs::require_host_settings() {
+  require_alone();
   if (force->newton_pair) fail_all(FLERR, lmp, std::string(kUser) + " needs 'newton off'");
   if (!comm->ghost_velocity) fail_all(FLERR, lmp, std::string(kUser) + " needs 'communicate single vel yes'");
 }

@@ -97,6 +97,7 @@ class PairGranNurbs : public PairGran {
   void allocate_laws();
   std::string layout() const { return models_ ? "model " + models_->layout() : ""; }
   void go_on_with_contacts();
+  void require_alone();
   void require_host_settings();
   void warn_of_sphere_values();
   void require_all_laws();

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <climits>
+#include <cmath>
 #include <cstdio>
 #include <cstring>
 #include <string>
@@ -66,6 +67,18 @@ std::vector<int> SetNurbs::chosen(const char* kind, char* which) const {
   return list;
 }
 
+// Values that the host refuses by a line from every rank that has such particles.
+void SetNurbs::check_value(const char* word, const char* text) const {
+  if (std::strncmp(text, "v_", 2) == 0) return;
+  if (std::strcmp(word, "mass") == 0) nurbs_host::parse_positive(lmp, "Set: mass", text);
+  if (std::strcmp(word, "type") != 0) return;
+  const double type = nurbs_host::parse_number(lmp, "Set: type", text);
+  if (type != std::floor(type) || type < 1 || type > atom->ntypes)
+    fail_all(FLERR, lmp,
+             std::string("Set: type = ") + text + " must be an atom type, in [1, " +
+                 std::to_string(atom->ntypes) + "]");
+}
+
 // Words between ours go to the host's command as they are.
 void SetNurbs::command(int narg, char** arg) {
   const auto host = [&](int first, int end) {
@@ -88,6 +101,7 @@ void SetNurbs::command(int narg, char** arg) {
         fail_all(FLERR, lmp,
                  std::string("Set: ") + arg[k] + " can't be set; NURBS particles have " + setter.words());
     if (std::strncmp(arg[k], "property/atom", 13) == 0) break;  // all that follows is its
+    if (k + 1 < narg) check_value(arg[k], arg[k + 1]);
     const int length = setter.length(arg[k]);
     if (length == 0) {
       ++k;

@@ -41,6 +41,7 @@ class SetNurbs : public UserCommandNurbs {
   void command(int narg, char** arg);
 
  private:
+  void check_value(const char* word, const char* text) const;
   std::vector<int> chosen(const char* kind, char* which) const;
 };
 

@@ -199,6 +199,11 @@ struct RectangularFace {
   std::vector<std::pair<TopoDS_Edge, int>> sides;  // edges that are one whole side
 };
 
+// Whether an edge or a wire bounds its face, and is not drawn on it inside.
+bool bounds(const TopoDS_Shape& part) {
+  return part.Orientation() == TopAbs_FORWARD || part.Orientation() == TopAbs_REVERSED;
+}
+
 // The patch of a face whose outline is a rectangle of its parameters; nothing if it is not.
 std::optional<RectangularFace> rectangular(const TopoDS_Face& face) {
   const Handle(Geom_Surface) surface = surface_of(face);
@@ -210,8 +215,7 @@ std::optional<RectangularFace> rectangular(const TopoDS_Face& face) {
   std::vector<Edge> edges;
   for (TopExp_Explorer e(face, TopAbs_EDGE); e.More(); e.Next()) {
     const TopoDS_Edge edge = TopoDS::Edge(e.Current());
-    if (edge.Orientation() != TopAbs_FORWARD && edge.Orientation() != TopAbs_REVERSED)
-      continue;  // bounds nothing
+    if (!bounds(edge)) continue;
     std::vector<gp_Pnt2d> points = parameter_curve(edge, face);
     if (points.empty()) return std::nullopt;
     edges.push_back({edge, std::move(points)});
@@ -304,9 +308,8 @@ struct Sides {
 
 // Patches of a plane face within one outline of straight edges and sides of other patches.
 std::vector<NurbsSurface> plane_patches(const TopoDS_Face& face, const Sides& sides) {
-  int wires = 0;  // those drawn on a face inside, which bound nothing, don't count
-  for (TopExp_Explorer w(face, TopAbs_WIRE); w.More(); w.Next())
-    wires += w.Current().Orientation() == TopAbs_FORWARD || w.Current().Orientation() == TopAbs_REVERSED;
+  int wires = 0;
+  for (TopExp_Explorer w(face, TopAbs_WIRE); w.More(); w.Next()) wires += bounds(w.Current());
   if (wires != 1) throw Trimmed{"a plane face has a hole"};
   std::vector<Side> outline;
   std::vector<Vec3> corners;

@@ -332,6 +332,7 @@ class Refused(unittest.TestCase):
                 (1, DECK + "run_style respa 2 2 pair 1\n", "run_style respa", "verlet"),
                 (1, DECK + "change_box all triclinic\n", "triclinic", "orthogonal"),
                 (1, DECK.replace("pair_style", "#").replace("pair_coeff", "#"), "no pair_style gran/nurbs"),
+                (1, DECK.replace("pair_style gran/nurbs", "pair_style hybrid gran/nurbs gran model hooke").replace("* * kn", "* * gran/nurbs kn"), "hybrid"),
                 (1, DECK.replace("gran/nurbs", "hybrid gran/nurbs").replace("* * kn", "* * gran/nurbs kn"), "hybrid"),
                 (1, DECK.replace("pair_style gran/nurbs", "pair_style sph/artVisc/tensCorr").replace("pair_coeff", "#"), "pair")):
             self.refuse(text + run, *expected, ranks=ranks)
@@ -366,6 +367,11 @@ class Refused(unittest.TestCase):
                 ("read_dump x.txt 0 x y z", "Read_dump")):
             self.refuse(DECK + command + "\n", *expected)
         self.refuse(DECK + "set group all nurbs/shape ball\n", "shape ball", ranks=2)
+        for command, *expected in (("set group all type 7", "type = 7", "in [1, "), ("set group all type 1.5", "type = 1.5"),
+                                   ("set group all vx 0 mass -1", "mass = -1", "> 0")):
+            run = deck.run(DECK + command + "\n", ranks=4, files=files())  # LIGGGHTS says it once a rank
+            self.assertEqual(len(run.errors), 1, run.screen)
+            self.refuse(DECK + command + "\n", *expected)
 
 
 class Warned(unittest.TestCase):

@@ -499,6 +499,47 @@ class Cylinders(unittest.TestCase):
                                       start=restart, **options)), last(one))
 
 
+class Reshaped(unittest.TestCase):
+    DECK = """
+units si
+newton off
+communicate single vel yes
+atom_style nurbs cube.json
+atom_modify map array sort 0 0
+boundary f f f
+read_data bodies.data
+neighbor 0.2 bin
+neigh_modify delay 0
+{pair}
+fix floor all wall/nurbs plane 0 0 0 0 0 1 {law}
+fix side all wall/nurbs {side} {law}
+fix weight all gravity 9.81 vector 0 0 -1
+fix motion all nve/nurbs
+timestep 1e-4
+variable s equal 1+1e-4*(step-1000)
+run 1000
+run 400 pre no every 20 "set group all nurbs/scale v_s"
+run 300 pre no
+dump d all custom 1 out.dump id x y z vx vy vz omegax omegay omegaz
+dump_modify d format "%d %.17g %.17g %.17g %.17g %.17g %.17g %.17g %.17g %.17g" sort id
+run 0 pre no
+"""
+
+    def test_a_change_of_size_within_a_run_reaches_every_wall(self):
+        """The second wall of two was never told where there was no pair style to bring the bodies up to date."""
+        law = "kn 1e6 kt 5e5 cn 2e3 mu 0.3"
+        cubes = [(1, 1, 1, 1.0, 2000.0, 0.0, 0.0, 0.999, 1.0, 0.0, 0.0, 0.0), (2, 1, 1, 1.0, 2000.0, 4.0, 0.5, 0.999, 1.0, 0.0, 0.0, 0.02)]
+        files = {"cube.json": deck.box_shape(1, 1, 1), "bodies.data": deck.data_file(cubes, (), ((-5, 10), (-5, 5), (-2, 8)))}
+        files["side.stl"] = stl([((-1, -3, -1), (-1, 3, -1), (-1, 3, 4)), ((-1, -3, -1), (-1, 3, 4), (-1, -3, 4))])
+        mesh = "fix m all mesh/surface file side.stl type 1\n"
+        for before, side in (("", "plane -1 0 0 1 0 0"), (mesh, "mesh m"), ("", "cylinder z 2.5 1.6 0")):
+            for ranks in (1, 2):
+                alone, pairs = (last(deck.run_ok(self.DECK.format(pair=before + pair, side=side, law=law), files=files, ranks=ranks))
+                                for pair in ("", f"pair_style gran/nurbs\npair_coeff * * {law}"))
+                self.assertGreater(pairs[1][0], 1e-3)  # the wall has pushed
+                self.assertEqual(alone, pairs)
+
+
 class RanksAndRestarts(unittest.TestCase):
     OPTIONS = dict(mesh=hills(), before=MESH)
 
@@ -543,6 +584,7 @@ class BadInput(unittest.TestCase):
         self.assert_error("radius = -1", "cylinder z -1 0 0")
         self.assert_error("move spin must be linear, rotate or wiggle", "plane 0 0 0 0 0 1", law=LAW + " move spin 1")
         self.assert_error("period = 0", "plane 0 0 0 0 0 1", law=LAW + " move wiggle amplitude 0 0 1 period 0")
+        self.assert_error("fix mesh/surface m was made anew", "mesh m", after=MESH, **floor)
         self.assert_error("needs neighbor SKIN bin", "mesh m", after="neighbor 0.005 nsq", **floor)
 
 
