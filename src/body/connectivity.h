@@ -1,6 +1,7 @@
 // Which patch edges lie on each other, found from the geometry alone, and how the normals meet there.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <string>
 #include <vector>
@@ -22,7 +23,7 @@ inline Vec2 edge_parameters(int edge, double t) {
 // `projected`, and this is a guess.
 inline double partner_parameter(const EdgeLink& link, double t) {
   const double s = link.reversed ? 1 - t : t;
-  return link.ratio == 1 ? s : link.ratio * s / (1 + (link.ratio - 1) * s);
+  return link.ratio == 1 ? s : std::min(1.0, link.ratio * s / (1 + (link.ratio - 1) * s));
 }
 
 // The same where the parameter has to be looked for: that of the point of the partner's edge closest to x.

@@ -426,9 +426,11 @@ CellBounds enclose_in_frame(const BezierPatch& patch, const Cell& cell, Wanted w
         weight.at(i, j) = Vec4(0, 0, 0, c[3]);
         if (i == rows) continue;
         const Vec4& z = turned_point(cell.z.data(), zp, zq, cell.pole, i, j);
-        net.at(i, j) << frame.to * z.head<3>(), 0;
+        net.at(i, j).head<3>() = frame.to * z.head<3>();
+        net.at(i, j)[3] = 0;
       } else {
-        net.at(i, j) << frame.to * (c.head<3>() - c[3] * middle), c[3];
+        net.at(i, j).head<3>() = frame.to * (c.head<3>() - c[3] * middle);
+        net.at(i, j)[3] = c[3];
       }
     }
   Vec4 noise;

@@ -333,7 +333,9 @@ Support search_patches(const Shape& shape, const Vec3& d, const Support& low) {
 }
 
 SurfacePoint start_for(const Shape& shape, const Vec3& d, const SurfacePoint* start) {
-  if (start && start->patch >= 0 && start->patch < static_cast<int>(shape.patches.size())) return *start;
+  if (start && start->patch >= 0 && start->patch < static_cast<int>(shape.patches.size()) && start->u >= 0 &&
+      start->u <= 1 && start->v >= 0 && start->v <= 1)
+    return *start;
   return shape.atlas.where[shape.atlas.nearest(d)];
 }
 

@@ -195,7 +195,8 @@ std::vector<NurbsSurface> SmoothCube::surfaces(const Eigen::VectorXd& gauge) con
     for (int i = 0; i < net_.size(); ++i)
       for (int j = 0; j < net_.size(); ++j) {
         const int at = net_.index(f, i, j);
-        homogeneous[at] << cube_direction(f, means[i], means[j]), gauge[at];
+        homogeneous[at].head<3>() = cube_direction(f, means[i], means[j]);
+        homogeneous[at][3] = gauge[at];
       }
   return cube_surfaces(net_, degree_, knots, homogeneous);
 }

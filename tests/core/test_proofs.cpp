@@ -413,6 +413,19 @@ TEST(Rates, hold_everywhere) {
   }
 }
 
+// A parameter of 1 + 2e-16 on a joint's other side made a step of 0 / 0, and a support of no number.
+TEST(Joints, parameters_across_stay_inside_the_patch) {
+  Random random(17);
+  for (int k = 0; k < 100000; ++k) {
+    EdgeLink link{};
+    link.reversed = k % 2;
+    link.ratio = std::pow(1e3, random.uniform(-1, 1));
+    const double t = k % 3 ? random.uniform(0, 1) : 1 - std::pow(10, random.uniform(-17, -12));
+    const double s = partner_parameter(link, t);
+    ASSERT_TRUE(s >= 0 && s <= 1) << "ratio " << link.ratio << ", t = " << t << ": " << s - 1;
+  }
+}
+
 TEST(Joints, mismatched_parameters_are_the_same_body) {
   Random random(3);
   const Vec3 axes(1, 0.8, 0.6);

@@ -88,7 +88,12 @@ void tumble_on_plane(const Solid& solid, Random& random, int steps) {
 // Weights slant parameter lines, make speeds differ by their ratio's square and crowd an edge's points at its
 // ends: bodies all the same, joined, and with the right supports.
 TEST(Solids, weights_of_any_size_are_loaded) {
-  for (int k = 0; k < 60; ++k) {
+#ifdef __SANITIZE_ADDRESS__
+  constexpr int kBodies = 8;  // half a second each, fifteen times that under sanitizers
+#else
+  constexpr int kBodies = 60;
+#endif
+  for (int k = 0; k < kBodies; ++k) {
     Random random(1001 + 2 * k);
     const int points = random.whole(4, 9);
     const double squeeze = random.log_uniform(0.05, 1);

@@ -26,6 +26,22 @@ TEST(Support, equals_the_closed_form_on_ellipsoids) {
   }
 }
 
+TEST(Support, starts_outside_the_patch_or_of_no_number_do_no_harm) {
+  Random random(11);
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  for (const ShapePointer& shape : all_shapes()) {
+    for (int k = 0; k < 100; ++k) {
+      const Vec3 d = random.direction();
+      const double best = find_support(*shape, d).h;
+      for (const double u : {-1e-17, 1 + 2.3e-16, 7.0, nan}) {
+        const SurfacePoint start{random.below(static_cast<int>(shape->patches.size())), u,
+                                 random.uniform(0, 1)};
+        ASSERT_NEAR(find_support(*shape, d, &start).h, best, 1e-12) << shape->name << ", from u = " << u;
+      }
+    }
+  }
+}
+
 TEST(Support, finds_the_global_maximum_from_the_atlas_and_from_far_starts) {
   Random random(2);
   for (const ShapePointer& shape : all_shapes()) {
