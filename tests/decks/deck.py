@@ -54,8 +54,9 @@ class Run:
         return dump_frames(self.read(name))
 
 
-def run(text, ranks=1, files=None, program=None, env=None, timeout=120):
-    """Runs the deck `text`. `files`: name -> text or path, put into the run's directory first."""
+def run(text, ranks=1, files=None, program=None, env=None, timeout=900):
+    """Runs the deck `text`. `files`: name -> text or path, put into the run's directory first. `timeout`, s, ends what hangs:
+    nothing else may depend on how fast a machine is."""
     directory = tempfile.TemporaryDirectory(prefix="nurbs-deck-")
     place = pathlib.Path(directory.name)
     (place / "in.deck").write_text(text)

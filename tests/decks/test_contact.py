@@ -388,7 +388,7 @@ dump p all local 100 pgl.dump c_pgl[7] c_pgl[8] c_pgl[10] c_pgl[11] c_pgl[12] c_
 class BadInput(unittest.TestCase):
 
     def fails(self, text, *words):
-        run = deck.run(text, ranks=1, files=files(), timeout=60)
+        run = deck.run(text, ranks=1, files=files())
         self.assertEqual(len(run.errors), 1, run.screen[-800:])
         self.assertEqual(run.status, 1)
         for word in words:

@@ -452,7 +452,7 @@ class HostFeatures(unittest.TestCase):
 class BadInput(unittest.TestCase):
 
     def expect(self, text, files, *parts):
-        run = deck.run(text, files=files, timeout=60)
+        run = deck.run(text, files=files)
         self.assertNotEqual(run.status, 0)
         self.assertEqual(len(run.errors), 1, run.screen)
         for part in parts:

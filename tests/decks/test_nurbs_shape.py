@@ -72,7 +72,7 @@ BAD = [(["cone"], "cone"),
 
 
 def call(*arguments):
-    return subprocess.run([PROGRAM, *arguments], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, timeout=120)
+    return subprocess.run([PROGRAM, *arguments], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, timeout=900)
 
 
 class NurbsShape(unittest.TestCase):
@@ -240,7 +240,7 @@ class NurbsShape(unittest.TestCase):
             if arguments == ["import"]:
                 (self.place / "grain.step").rename(self.place / "part.step")
             run = subprocess.run([PROGRAM, *words], cwd=self.place, stdout=subprocess.PIPE, stderr=subprocess.PIPE,
-                                 text=True, timeout=300)
+                                 text=True, timeout=900)
             self.assertEqual((run.returncode, run.stderr), (0, ""), examples[0])
             if "-o" in words and arguments != ["make", "pebbles"]:
                 self.assertTrue((self.place / words[words.index("-o") + 1]).exists(), examples[0])

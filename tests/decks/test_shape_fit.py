@@ -17,7 +17,7 @@ PROGRAM = str(deck.BUILD / "nurbs-shape")
 
 def call(*arguments):
     return subprocess.run([PROGRAM, *map(str, arguments)], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
-                          timeout=300)
+                          timeout=900)
 
 
 def basis(degree, knots, count, t):

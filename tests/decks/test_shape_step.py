@@ -17,7 +17,7 @@ PROGRAM = str(deck.BUILD / "nurbs-shape")
 
 def call(*arguments):
     return subprocess.run([PROGRAM, *map(str, arguments)], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
-                          timeout=120)
+                          timeout=900)
 
 
 HEAD = """ISO-10303-21;
