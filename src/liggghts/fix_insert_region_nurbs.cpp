@@ -1,14 +1,19 @@
 // See fix_insert_region_nurbs.h.
 #include "liggghts/fix_insert_region_nurbs.h"
 
+#include <mpi.h>
+
 #include <cmath>
 #include <string>
 #include <vector>
 
 #include "atom.h"
+#include "fix_property_atom.h"
 #include "liggghts/atom_vec_nurbs.h"
 #include "liggghts/host_error.h"
+#include "modify.h"
 #include "region.h"
+#include "update.h"
 
 namespace LAMMPS_NS {
 
@@ -56,6 +61,26 @@ int FixInsertPackNurbs::calc_ninsert_this() {
   const int count = FixInsertPack::calc_ninsert_this();
   atom->radius = bounding;
   return count;
+}
+
+// Particles behind the face keep the insertion velocity until their step of release, which a restart holds.
+// The host scales what is left of it from the time step that there was to the present one: before the input
+// script's `timestep` that is a default, often a thousandth, and they would fly on through all they meet.
+void FixInsertStreamNurbs::post_create() {
+  FixInsertStream::post_create();
+  if (!holds_nurbs(*atom) || update->timestep_set || !modify->fix_restart_in_progress()) return;
+  auto* release = dynamic_cast<FixPropertyAtom*>(
+      modify->find_fix_property("release_fix_insert_stream", "property/atom", "vector", 5, 0, style, false));
+  if (release == nullptr) return;
+  int mine = 0, all = 0;
+  for (int i = 0; i < atom->nlocal; ++i)
+    mine += release->array_atom[i][4] > static_cast<double>(update->ntimestep);
+  MPI_Allreduce(&mine, &all, 1, MPI_INT, MPI_SUM, world);
+  if (all > 0)
+    nurbs_host::fail_all(FLERR, lmp,
+                         nurbs_host::name_of(*this) + ": " + std::to_string(all) +
+                             " particles of the restart are on their way to the insertion face; give the "
+                             "'timestep' before this fix");
 }
 
 }  // namespace LAMMPS_NS

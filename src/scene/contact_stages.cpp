@@ -34,6 +34,14 @@ NURBS_INLINE BodyMotionOf<Wide> gather_motion(const double* const (&record)[kWid
           f[15]};
 }
 
+// A body that came through a periodic edge is elsewhere on the plane at rest that it touches, and has not
+// moved.
+void follow_wrap(const ContactGeometry& g, double least, ContactState* state) {
+  const Vec3 way = g.arm_a - g.arm_b - (load(state->arm_a) - load(state->arm_b));
+  const Vec3 along = way - way.dot(g.normal) * g.normal;
+  if (along.norm() > least) store(Vec3(load(state->arm_a) + along), state->arm_a);
+}
+
 }  // namespace
 
 void ContactCounts::add(const ContactResult& result, double weight) {
@@ -533,6 +541,7 @@ void ContactStages::start_run(ContactBlock& block, int lane, const Results& resu
     block.get(lane, kStateField, kContactStateSize, &state);
     const double same = std::min(10 * step_.settings.tolerance, kSamePose) * smaller_radius(a, b) +
                         1e-13 * (results.offset_of(lane).norm() + load(record(a).x).norm());
+    if (a == -1) follow_wrap(geometry, same, &state);
     const bool goes_on = !step_.changed && state.dt > 0 && same_geometry(state, geometry, same);
     if (step_.model != nullptr) {
       if (goes_on)

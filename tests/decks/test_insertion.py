@@ -245,17 +245,22 @@ class Where(Decks):
             self.assertGreater(len(frame["x"]), 100)
             self.assertGreater(least_separation(frame)[0], 0.999)
 
-    def test_stream(self):
-        """Through a face: no turning and no forces until a particle has passed it, then it falls freely."""
+    @staticmethod
+    def face():
         face = "solid f\n"
         for third in ("2 2", "-2 -2"):
             corners = ["-2 2 6", "2 -2 6"] if third == "2 2" else ["2 -2 6", "-2 2 6"]
             face += "facet normal 0 0 1\nouter loop\n" + "".join(f"vertex {c}\n" for c in [*corners, third + " 6"])
             face += "endloop\nendfacet\n"
-        face += "endsolid f\n"
-        text = header() + PLAIN + "fix face all mesh/surface/planar file face.stl type 1\nfix g all gravity 9.81 vector 0 0 -1\n"
-        text += ("fix i all insert/stream seed 49979687 distributiontemplate one nparticles 40 massrate 1e5 overlapcheck yes "
-                 "vel constant 0 0 -3 omega constant 1 2 3 insertion_face face extrude_length 2\n")
+        return face + "endsolid f\n"
+
+    STREAM = (PLAIN + "fix face all mesh/surface/planar file face.stl type 1\nfix g all gravity 9.81 vector 0 0 -1\n"
+              "fix i all insert/stream seed 49979687 distributiontemplate one nparticles 40 massrate 1e5 overlapcheck yes "
+              "vel constant 0 0 -3 omega constant 1 2 3 insertion_face face extrude_length 2\n")
+
+    def test_stream(self):
+        """Through a face: no turning and no forces until a particle has passed it, then it falls freely."""
+        face, text = self.face(), header() + self.STREAM
         text += OUTPUT.replace("custom 1 ", "custom 500 ") + "timestep 1e-3\nrun 1000\n"
         for ranks in (1, 2):
             run = self.run_deck(text, ranks=ranks, more={"face.stl": face})
@@ -269,6 +274,23 @@ class Where(Decks):
             falling = (last["z"] < 5.9) & (last["z"] > 1)
             self.assertGreater(falling.sum(), 5)
             np.testing.assert_array_less(last["vz"][falling], -3.01)
+
+    def test_stream_goes_on_after_a_restart(self):
+        """Particles on their way to the face are let go there, not later; where the host would mistake the step, it says so."""
+        face, step = self.face(), "timestep 1e-3\n"
+        end = "dump d all custom 500 dump.txt id x y z vx vy vz\n" + step
+        whole = self.run_deck(header() + step + self.STREAM + end + "run 250\nwrite_restart half.restart\nrun 250\n", more={"face.stl": face})
+        more = {"half.restart": whole.path / "half.restart", "face.stl": face}
+        again = ("newton off\natom_modify map array\nread_restart half.restart\ncommunicate single vel yes\nneighbor 0.3 bin\n"
+                 "neigh_modify delay 0\nfix motion all nve/nurbs\n")
+        for ranks in (1, 2):
+            run = deck.run(again + self.STREAM + end + "run 250\n", ranks=ranks, files=more)
+            self.assertNotEqual(run.status, 0)
+            self.assertRegex(run.errors[0], "Fix insert/stream i: [0-9]+ particles .* 'timestep' before this fix")
+            run = deck.run_ok(again + step + self.STREAM + end + "run 250\n", ranks=ranks, files=more)
+            expected, found = (r.dump("dump.txt")[-1][1] for r in (whole, run))
+            np.testing.assert_allclose(found["vz"], expected["vz"], atol=1.1 * 9.81e-3)  # a step's share
+            self.assertGreater(np.ptp(expected["vz"]), 1)
 
 
 class Refused(Decks):

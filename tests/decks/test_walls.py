@@ -562,6 +562,23 @@ class RanksAndRestarts(unittest.TestCase):
                              start="newton off\ncommunicate single vel yes\nread_restart half.rst\n", **self.OPTIONS))
 
 
+    def test_a_run_begins_behind_a_periodic_border(self):
+        """A body that touches a plane at rest comes through the border as the second run begins: it has not been moved."""
+        atom = [(1, 1, 1, 0.03, 2500.0, 0.19995, 0.0, 0.0238, 1.0, 0.0, 0.0, 0.0)]
+        options = {"atoms": atom, "velocities": [(1, 0.1, 0.02, -0.05, 3.0, 2.0, 1.0)], "boundary": "p f f",
+                   "law": "kn 1e5 kt 5e4 cn 200 ct 100 mu 0.3"}
+        whole, parts = (run("plane 0 0 0 0 0 1", steps=steps, **options) for steps in ("run 500", "run 150\nrun 350"))
+        x = [frame[1]["x"][0] for frame in parts.dump("out.dump")]
+        self.assertLess(min(x), -0.19)  # it came through
+        ends, begins = (table[-1] if n == 0 else table[0] for n, table in enumerate(t["w[3]"] for t in parts.tables))
+        self.assertAlmostEqual(begins / ends, 1, delta=1e-10)
+        difference = np.array(last(parts))[1:].ravel() - np.array(last(whole))[1:].ravel()
+        difference[0] += 0.4
+        np.testing.assert_allclose(difference, 0, atol=1e-11)
+        arm = [-t["w[5]"][n] / t["w[3]"][n] for t, n in zip(parts.tables, (-1, 0))]
+        self.assertAlmostEqual(arm[0] - arm[1], 0.4, delta=1e-3)  # the torque on it is about its point, as before
+
+
 class BadInput(unittest.TestCase):
 
     def assert_error(self, words, wall, **options):
