@@ -7,6 +7,7 @@
 #include <BRepBuilderAPI_MakeFace.hxx>
 #include <BRepBuilderAPI_MakeSolid.hxx>
 #include <BRepBuilderAPI_Sewing.hxx>
+#include <BRepCheck_Analyzer.hxx>
 #include <BRepClass3d.hxx>
 #include <BRepGProp.hxx>
 #include <BRepLib.hxx>
@@ -37,8 +38,11 @@
 #include <Message_Messenger.hxx>
 #include <Message_Printer.hxx>
 #include <Poly_Triangulation.hxx>
+#include <Resource_Manager.hxx>
+#include <STEPControl_Controller.hxx>
 #include <STEPControl_Reader.hxx>
 #include <STEPControl_Writer.hxx>
+#include <ShapeProcess_Context.hxx>
 #include <Standard_Failure.hxx>
 #include <StepRepr_RepresentationItem.hxx>
 #include <TCollection_HAsciiString.hxx>
@@ -509,14 +513,37 @@ void check_head(const std::string& file, const std::string& mark, const char* ki
   if (head.find(mark) == std::string::npos) throw ShapeError(std::string("is no ") + kind + " file");
 }
 
+// A spherical face with one outline lies to the left of it. Open CASCADE takes the part that the outline
+// surrounds in the parameters, be it the other one, unless told to add the sphere's own bounds; that in turn
+// spoils whole toruses.
+void add_bounds_of_spheres(bool add) {
+  STEPControl_Controller::Init();
+  const Handle(Resource_Manager) settings = ShapeProcess_Context("STEP").ResourceManager();
+  const auto set = [&](const char* name, const auto& value) {
+    settings->SetResource((std::string("FromSTEP.") + name).c_str(), value);
+  };
+  set("exec.op", "FixShape");  // with what it does when there are no settings
+  set("FixShape.Tolerance3d", "&Runtime.Tolerance");
+  set("FixShape.MaxTolerance3d", "&Runtime.MaxTolerance");
+  set("FixShape.CreateOpenSolidMode", 0);
+  set("FixShape.FixSameParameterMode", 0);
+  set("FixShape.FixAddNaturalBoundMode", add ? 1 : -1);
+}
+
 std::vector<CadSolid> read_step(const std::string& file, double scale) {
   check_head(file, "ISO-10303-21", "STEP");
-  STEPControl_Reader reader;
-  if (reader.ReadFile(file.c_str()) != IFSelect_RetDone) throw ShapeError("is damaged: STEP can't be parsed");
-  reader.TransferRoots();
-  if (reader.NbShapes() == 0) throw ShapeError("holds no shape, or a damaged one");
-  return solids_of(reader.OneShape(), scale,
-                   [&](const TopoDS_Shape& solid) { return step_name(reader, solid); });
+  std::optional<STEPControl_Reader> reader;
+  for (bool add : {true, false}) {
+    add_bounds_of_spheres(add);
+    reader.emplace();
+    if (reader->ReadFile(file.c_str()) != IFSelect_RetDone)
+      throw ShapeError("is damaged: STEP can't be parsed");
+    reader->TransferRoots();
+    if (reader->NbShapes() == 0) throw ShapeError("holds no shape, or a damaged one");
+    if (BRepCheck_Analyzer(reader->OneShape()).IsValid()) break;
+  }
+  return solids_of(reader->OneShape(), scale,
+                   [&](const TopoDS_Shape& solid) { return step_name(*reader, solid); });
 }
 
 std::string no_name(const TopoDS_Shape&) {

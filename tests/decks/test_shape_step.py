@@ -99,15 +99,15 @@ class Step:
         self.solid([self.face(side, [(rim0, True), (seam, True), (rim1, False), (seam, False)]),
                     self.face(under, [(rim0, False)]), self.face(self.add(f"PLANE('',{top})"), [(rim1, True)])])
 
-    def ball_cut_by(self, radius, height):
-        """The part z > height > 0 of a ball whose own axis is x, so that the cut is no line of its parameters."""
+    def ball_cut_by(self, radius, height, upper=True):
+        """The part z > height > 0 of a ball whose own axis is x, so that the cut is no line of its parameters; or the rest."""
         rim = math.sqrt(radius**2 - height**2)
         at = self.vertex((rim, 0, height))
         frame = self.frame((0, 0, height), (0, 0, 1), (1, 0, 0))
         edge = self.circle(at, at, frame, rim)
         ball = self.add(f"SPHERICAL_SURFACE('',{self.frame((0, 0, 0), (1, 0, 0), (0, 0, -1))},{radius:.16E})")
-        plane = self.add(f"PLANE('',{self.frame((0, 0, height), (0, 0, -1), (1, 0, 0))})")
-        self.solid([self.face(ball, [(edge, True)]), self.face(plane, [(edge, False)])])
+        plane = self.add(f"PLANE('',{self.frame((0, 0, height), (0, 0, -1 if upper else 1), (1, 0, 0))})")
+        self.solid([self.face(ball, [(edge, upper)]), self.face(plane, [(edge, not upper)])])
 
     def text(self):
         context = self.add("APPLICATION_CONTEXT('')")
@@ -233,6 +233,18 @@ class ShapeStep(unittest.TestCase):
         corners = [(rim * math.cos(t), rim * math.sin(t), height) for t in np.linspace(0, 6, 20)]
         missed = max(np.linalg.norm(points - c, axis=1).min() for c in corners)
         self.assertLess(missed, (inward + 1) / 100 * size + 0.1)  # 0.1: the points' own distance
+
+    def test_an_outline_has_its_face_to_the_left(self):
+        """Either part of a ball, each bounded by the same circle."""
+        radius, height, out = 5.0, 1.0, self.place / "out.json"
+        cap = math.pi * (radius - height)**2 * (2 * radius + height) / 3
+        for upper, volume in ((True, cap), (False, 4 / 3 * math.pi * radius**3 - cap)):
+            step = Step()
+            step.ball_cut_by(radius, height, upper)
+            told = self.good("import", self.write("cut.step", step), "--tolerance", "10%", "-o", out)
+            added, found = (float(x) for x in re.search(r"hull: .*adds (\S+) % to the mesh's volume of (\S+)\n", told).groups())
+            self.assertLess(added, 1)
+            self.assertAlmostEqual(found / volume, 1, delta=0.01)
 
     def test_units(self):
         out, step = self.place / "out.json", self.place / "out.step"
