@@ -51,6 +51,7 @@
 #include <TopTools_DataMapOfShapeInteger.hxx>
 #include <TopTools_IndexedDataMapOfShapeListOfShape.hxx>
 #include <TopoDS.hxx>
+#include <TopoDS_Compound.hxx>
 #include <TransferBRep.hxx>
 #include <Transfer_TransientProcess.hxx>
 #include <XSControl_TransferReader.hxx>
@@ -530,20 +531,40 @@ void add_bounds_of_spheres(bool add) {
   set("FixShape.FixAddNaturalBoundMode", add ? 1 : -1);
 }
 
+// The solids of two readings of a file: of the second those that are not sound in the first, and free faces.
+TopoDS_Shape sound_ones(const TopoDS_Shape& first, const TopoDS_Shape& second) {
+  std::vector<TopoDS_Shape> a, b;
+  for (TopExp_Explorer s(first, TopAbs_SOLID); s.More(); s.Next()) a.push_back(s.Current());
+  for (TopExp_Explorer s(second, TopAbs_SOLID); s.More(); s.Next()) b.push_back(s.Current());
+  if (a.size() != b.size()) return second;
+  TopoDS_Compound out;
+  BRep_Builder builder;
+  builder.MakeCompound(out);
+  for (size_t k = 0; k < a.size(); ++k) builder.Add(out, BRepCheck_Analyzer(a[k]).IsValid() ? a[k] : b[k]);
+  for (TopExp_Explorer f(second, TopAbs_FACE, TopAbs_SOLID); f.More(); f.Next())
+    builder.Add(out, f.Current());
+  return out;
+}
+
 std::vector<CadSolid> read_step(const std::string& file, double scale) {
   check_head(file, "ISO-10303-21", "STEP");
-  std::optional<STEPControl_Reader> reader;
-  for (bool add : {true, false}) {
+  std::array<STEPControl_Reader, 2> readers;
+  TopoDS_Shape content;
+  for (const bool add : {true, false}) {
+    STEPControl_Reader& reader = readers[add ? 0 : 1];
     add_bounds_of_spheres(add);
-    reader.emplace();
-    if (reader->ReadFile(file.c_str()) != IFSelect_RetDone)
+    if (reader.ReadFile(file.c_str()) != IFSelect_RetDone)
       throw ShapeError("is damaged: STEP can't be parsed");
-    reader->TransferRoots();
-    if (reader->NbShapes() == 0) throw ShapeError("holds no shape, or a damaged one");
-    if (BRepCheck_Analyzer(reader->OneShape()).IsValid()) break;
+    reader.TransferRoots();
+    if (reader.NbShapes() == 0) throw ShapeError("holds no shape, or a damaged one");
+    const TopoDS_Shape found = reader.OneShape();
+    content = add ? found : sound_ones(content, found);
+    if (add && BRepCheck_Analyzer(found).IsValid()) break;
   }
-  return solids_of(reader->OneShape(), scale,
-                   [&](const TopoDS_Shape& solid) { return step_name(*reader, solid); });
+  return solids_of(content, scale, [&](const TopoDS_Shape& solid) {
+    const std::string name = step_name(readers[0], solid);
+    return name.empty() && readers[1].NbShapes() > 0 ? step_name(readers[1], solid) : name;
+  });
 }
 
 std::string no_name(const TopoDS_Shape&) {

@@ -246,6 +246,16 @@ class ShapeStep(unittest.TestCase):
             self.assertLess(added, 1)
             self.assertAlmostEqual(found / volume, 1, delta=0.01)
 
+    def test_a_ring_beside_a_cut_ball(self):
+        """Each is read wrongly by the settings that are right for the other."""
+        radius, height, out = 5.0, 1.0, self.place / "out.json"
+        cap = math.pi * (radius - height)**2 * (2 * radius + height) / 3
+        file = deck.ROOT / "tests/cases/cad-ring-and-cut-ball.step"
+        for solid, volume in ((1, 2 * math.pi**2 * 4), (2, 4 / 3 * math.pi * radius**3 - cap)):
+            told = self.good("import", file, "--solid", solid, "--tolerance", "10%", "-o", out)
+            found = float(re.search(r"to the mesh's volume of (\S+)\n", told).group(1))
+            self.assertAlmostEqual(found / volume, 1, delta=0.02)
+
     def test_units(self):
         out, step = self.place / "out.json", self.place / "out.step"
         for name, unit, length in (("mm.step", "SI_UNIT(.MILLI.,.METRE.)", 1), ("m.step", "SI_UNIT($,.METRE.)", 1000)):
