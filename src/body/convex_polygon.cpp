@@ -89,15 +89,6 @@ void merge_corners(ConvexPolygon& p, double slack) {
   p.count = count;
 }
 
-double least_depth(const ConvexPolygon& polygon, const Vec2* points, int count) {
-  double least = std::numeric_limits<double>::infinity();
-  for (int i = 0; i < polygon.count; ++i) {
-    const SideLine line(polygon, i);
-    for (int k = 0; k < count; ++k) least = std::min(least, line.distance(points[k]));
-  }
-  return least;
-}
-
 }  // namespace
 
 double polygon_area(const ConvexPolygon& p) {
@@ -119,12 +110,13 @@ Vec2 polygon_centroid(const ConvexPolygon& p) {
   return p.corner[0] + sum / (3 * twice);
 }
 
-double depth_inside(const ConvexPolygon& polygon, const Vec2& point) {
-  return least_depth(polygon, &point, 1);
-}
-
 double depth_inside(const ConvexPolygon& polygon, const ConvexPolygon& points) {
-  return least_depth(polygon, points.corner, points.count);
+  double least = std::numeric_limits<double>::infinity();
+  for (int i = 0; i < polygon.count; ++i) {
+    const SideLine line(polygon, i);
+    for (int k = 0; k < points.count; ++k) least = std::min(least, line.distance(points.corner[k]));
+  }
+  return least;
 }
 
 SideLines::SideLines(const ConvexPolygon& polygon) {

@@ -36,9 +36,8 @@ inline double cross2(const Vec2& a, const Vec2& b) {
 double polygon_area(const ConvexPolygon& polygon);
 Vec2 polygon_centroid(const ConvexPolygon& polygon);  // its area must be > 0
 
-// How far a point, or the corners of `points` at least, are inside the polygon: signed distance to the
-// nearest of the lines through its sides, < 0 outside.
-double depth_inside(const ConvexPolygon& polygon, const Vec2& point);
+// How far the corners of `points` at least are inside the polygon: signed distance to the nearest of the
+// lines through its sides, < 0 outside.
 double depth_inside(const ConvexPolygon& polygon, const ConvexPolygon& points);
 
 // The lines through a polygon's sides, kept for one that is asked often.
@@ -46,7 +45,7 @@ class SideLines {
  public:
   SideLines() = default;
   explicit SideLines(const ConvexPolygon& polygon);
-  double depth_inside(const Vec2& point) const;  // as above
+  double depth_inside(const Vec2& point) const;  // as above, of one point
 
  private:
   std::vector<double> x_, y_, offset_;  // padded, so that several are looked at together

@@ -129,13 +129,6 @@ double difference(const Meridian::Piece& a, const Meridian::Piece& b, bool backw
   return most;
 }
 
-bool is_square_plane(const BezierPatch& patch, const Meridian& m, double close) {
-  const double z = m.axes.row(2).dot(patch.points[0].head<3>()) / patch.points[0][3];
-  return std::all_of(patch.points.begin(), patch.points.end(), [&](const Vec4& p) {
-    return std::abs(m.axes.row(2).dot(p.head<3>()) / p[3] - z) <= close;
-  });
-}
-
 // --- the support of the profile
 
 // Part of a piece: coefficients of f = dr r + dz z - level w, and of w.
@@ -373,7 +366,7 @@ Meridian make_meridian(const std::vector<BezierPatch>& patches, const Revolution
       sector.arcs_in_u = arcs_in_u;
     }
     if (!(error <= close)) {
-      if (!is_square_plane(patches[p], m, close)) return {};
+      if (!(out_of_plane(patches[p], revolution.axis) <= close)) return {};
       continue;
     }
     sector.patch = static_cast<int>(p);
@@ -425,8 +418,7 @@ bool find_meridian_support(const Meridian& m, const Vec3& d, double size, const 
                            MeridianSupport* found) {
   const Vec3 e = m.axes * d;
   const double dr = std::hypot(e[0], e[1]);
-  const bool started = start && start->patch >= 0 && start->patch < static_cast<int>(m.sector_of.size()) &&
-                       m.sector_of[start->patch] >= 0;
+  const bool started = start && m.sector_of[start->patch] >= 0;
   const Meridian::Sector* last = started ? &m.sectors[m.sector_of[start->patch]] : nullptr;
 
   const double place = place_in_table(dr, e[2]);

@@ -115,16 +115,6 @@ double off_arcs(const BezierPatch& patch, bool arcs_in_u, const Revolution& abou
   return std::isfinite(error) ? error : std::numeric_limits<double>::infinity();
 }
 
-double out_of_plane(const BezierPatch& patch, const Vec3& axis) {
-  double low = kFarAway, high = -kFarAway;
-  for (const Vec4& p : patch.points) {
-    const double z = axis.dot(p.head<3>()) / p[3];
-    low = std::min(low, z);
-    high = std::max(high, z);
-  }
-  return high - low;
-}
-
 // Of the widest bent line of control points: the normal of its plane, and the centre of the circle through
 // its ends and its middle.
 bool guess_axis(const std::vector<BezierPatch>& patches, bool arcs_in_u, Revolution* r) {
@@ -245,6 +235,16 @@ Revolution about_axis_of(const Ellipsoid& e, double size) {
 }
 
 }  // namespace
+
+double out_of_plane(const BezierPatch& patch, const Vec3& axis) {
+  double low = kFarAway, high = -kFarAway;
+  for (const Vec4& p : patch.points) {
+    const double z = axis.dot(p.head<3>()) / p[3];
+    low = std::min(low, z);
+    high = std::max(high, z);
+  }
+  return high - low;
+}
 
 Revolution find_revolution(const std::vector<BezierPatch>& patches, const Ellipsoid& ellipsoid, double size) {
   for (const bool arcs_in_u : {true, false}) {

@@ -24,4 +24,7 @@ struct Revolution {
 // other parameters are not found. `size`: bounding radius.
 Revolution find_revolution(const std::vector<BezierPatch>& patches, const Ellipsoid& ellipsoid, double size);
 
+// By how much the heights of a patch's control points along `axis`, unit, differ: 0 in a plane square to it.
+double out_of_plane(const BezierPatch& patch, const Vec3& axis);
+
 }  // namespace nurbs

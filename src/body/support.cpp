@@ -332,15 +332,18 @@ Support search_patches(const Shape& shape, const Vec3& d, const Support& low) {
   return s;
 }
 
-SurfacePoint start_for(const Shape& shape, const Vec3& d, const SurfacePoint* start) {
-  if (start && start->patch >= 0 && start->patch < static_cast<int>(shape.patches.size()) && start->u >= 0 &&
-      start->u <= 1 && start->v >= 0 && start->v <= 1)
-    return *start;
-  return shape.atlas.where[shape.atlas.nearest(d)];
+// A start if it is a point of the body; nullptr if not, or if its parameters are no numbers.
+const SurfacePoint* if_on_body(const Shape& shape, const SurfacePoint* start) {
+  const auto inside = [](double x) { return x >= 0 && x <= 1; };
+  const bool on = start && start->patch >= 0 && start->patch < static_cast<int>(shape.patches.size()) &&
+                  inside(start->u) && inside(start->v);
+  return on ? start : nullptr;
 }
 
-// Bodies of bilinear patches have their support at a corner: nothing to climb.
-Support begin(const Shape& shape, const Vec3& d, const SurfacePoint& at) {
+// From the start, or from the atlas. Bodies of bilinear patches have their support at a corner: nothing to
+// climb.
+Support begin(const Shape& shape, const Vec3& d, const SurfacePoint* start) {
+  const SurfacePoint at = start ? *start : shape.atlas.where[shape.atlas.nearest(d)];
   if (!shape.bilinear) return climb(shape, d, at);
   Support s;
   s.where = at;
@@ -373,15 +376,17 @@ bool find_on_meridian(const Shape& shape, const Vec3& d, const SurfacePoint* sta
 }  // namespace
 
 Support find_support(const Shape& shape, const Vec3& d, const SurfacePoint* start) {
+  start = if_on_body(shape, start);
   if (Support s; find_on_meridian(shape, d, start, &s)) return s;
-  const Support local = begin(shape, d, start_for(shape, d, start));
+  const Support local = begin(shape, d, start);
   if (is_certain(shape, local, 0) || (shape.dented() && std::isfinite(local.upper))) return local;
   return search_patches(shape, d, local);
 }
 
 Support find_hull_support(const Shape& shape, const Vec3& d, const SurfacePoint* start, double enough) {
+  start = if_on_body(shape, start);
   if (Support s; find_on_meridian(shape, d, start, &s)) return s;
-  const Support local = begin(shape, d, start_for(shape, d, start));
+  const Support local = begin(shape, d, start);
   return is_certain(shape, local, enough) ? local : search_patches(shape, d, local);
 }
 

@@ -20,8 +20,8 @@ struct Support {
 };
 
 // A local maximum of d . x over `shape`, d unit (shape frame), by box-constrained Newton in one Bezier patch
-// that moves to the neighbour through the links when a parameter leaves its patch. `start` nullptr (or of no
-// patch of the body): from the atlas. A body without dents has no other maximum than the support; where the
+// that moves to the neighbour through the links when a parameter leaves its patch. `start` nullptr (or no
+// point of the body): from the atlas. A body without dents has no other maximum than the support; where the
 // surface normal at the end does not prove the point to be it (poles, creases, corners, a start on the far
 // side), this is find_hull_support.
 Support find_support(const Shape& shape, const Vec3& d, const SurfacePoint* start = nullptr);

@@ -166,16 +166,10 @@ void FixWallNurbs::parse_law(int first, int narg, char** arg) {
     law_ = nurbs_host::parse_coefficients(lmp, "Fix wall/nurbs", first, narg, arg);
     return;
   }
-  const std::string value = narg > first + 1 ? arg[first + 1] : "";
-  char* end = nullptr;
-  const long type = std::strtol(value.c_str(), &end, 10);
-  if (value.empty() || *end != '\0' || type < 1 || type > atom->ntypes)
-    fail_all(FLERR, lmp,
-             "Fix wall/nurbs: type = " + value + " must be an atom type, in [1, " +
-                 std::to_string(atom->ntypes) + "]");
-  wall_type_ = static_cast<int>(type);
-  models_ = std::make_unique<nurbs_host::HostModels>(lmp, "Fix wall/nurbs", static_cast<int>(type),
-                                                     narg - first - 2, arg + first + 2);
+  wall_type_ =
+      nurbs_host::parse_atom_type(lmp, "Fix wall/nurbs: type", narg > first + 1 ? arg[first + 1] : "");
+  models_ = std::make_unique<nurbs_host::HostModels>(lmp, "Fix wall/nurbs", wall_type_, narg - first - 2,
+                                                     arg + first + 2);
   stages_.pool().set_memory_size(nurbs::kModelMemory + models_->history_size());
 }
 

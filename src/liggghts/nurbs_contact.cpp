@@ -9,6 +9,7 @@
 #include <cstdlib>
 #include <cstring>
 
+#include "atom.h"
 #include "compute.h"
 #include "domain.h"
 #include "lammps.h"
@@ -74,6 +75,15 @@ double parse_not_negative(LAMMPS* lmp, const std::string& what, const char* text
   const double value = parse_finite(lmp, what, text, " >= 0");
   if (value < 0) out_of_range(lmp, what, text, " >= 0");
   return value;
+}
+
+int parse_atom_type(LAMMPS* lmp, const std::string& what, const char* text) {
+  const double type = parse_number(lmp, what, text);
+  const int types = lmp->atom->ntypes;
+  if (type != std::floor(type) || type < 1 || type > types)
+    fail_all(FLERR, lmp,
+             what + " = " + text + " must be an atom type, in [1, " + std::to_string(types) + "]");
+  return static_cast<int>(type);
 }
 
 nurbs::Quat parse_quaternion(LAMMPS* lmp, const std::string& what, char** text) {

@@ -28,6 +28,9 @@ double parse_number(LAMMPS* lmp, const std::string& what, const char* text);
 double parse_positive(LAMMPS* lmp, const std::string& what, const char* text);
 double parse_not_negative(LAMMPS* lmp, const std::string& what, const char* text);
 
+// An atom type, in [1, ntypes]. Ends the run otherwise. Collective.
+int parse_atom_type(LAMMPS* lmp, const std::string& what, const char* text);
+
 // Four numbers, w x y z, normalised; not all 0. Ends the run otherwise. Collective.
 nurbs::Quat parse_quaternion(LAMMPS* lmp, const std::string& what, char** text);
 

@@ -71,12 +71,7 @@ std::vector<int> SetNurbs::chosen(const char* kind, char* which) const {
 void SetNurbs::check_value(const char* word, const char* text) const {
   if (std::strncmp(text, "v_", 2) == 0) return;
   if (std::strcmp(word, "mass") == 0) nurbs_host::parse_positive(lmp, "Set: mass", text);
-  if (std::strcmp(word, "type") != 0) return;
-  const double type = nurbs_host::parse_number(lmp, "Set: type", text);
-  if (type != std::floor(type) || type < 1 || type > atom->ntypes)
-    fail_all(FLERR, lmp,
-             std::string("Set: type = ") + text + " must be an atom type, in [1, " +
-                 std::to_string(atom->ntypes) + "]");
+  if (std::strcmp(word, "type") == 0) nurbs_host::parse_atom_type(lmp, "Set: type", text);
 }
 
 // Words between ours go to the host's command as they are.

@@ -482,16 +482,27 @@ TopoDS_Shape placed_rigidly(const TopoDS_Shape& content) {
   return places.Perform(content) ? places.GetResult() : content;
 }
 
+std::vector<TopoDS_Shape> solids_in(const TopoDS_Shape& content) {
+  std::vector<TopoDS_Shape> solids;
+  for (TopExp_Explorer s(content, TopAbs_SOLID); s.More(); s.Next()) solids.push_back(s.Current());
+  return solids;
+}
+
+std::vector<TopoDS_Shape> free_faces_in(const TopoDS_Shape& content) {
+  std::vector<TopoDS_Shape> faces;
+  for (TopExp_Explorer f(content, TopAbs_FACE, TopAbs_SOLID); f.More(); f.Next())
+    faces.push_back(f.Current());
+  return faces;
+}
+
 std::vector<CadSolid> solids_of(const TopoDS_Shape& content, double scale,
                                 const std::function<std::string(const TopoDS_Shape&)>& name) {
   std::vector<CadSolid> out;
-  for (TopExp_Explorer s(content, TopAbs_SOLID); s.More(); s.Next()) {
-    out.push_back(describe(s.Current(), scale));
-    out.back().name = name(s.Current());
+  for (const TopoDS_Shape& solid : solids_in(content)) {
+    out.push_back(describe(solid, scale));
+    out.back().name = name(solid);
   }
-  std::vector<TopoDS_Shape> faces;  // of no solid
-  for (TopExp_Explorer f(content, TopAbs_FACE, TopAbs_SOLID); f.More(); f.Next())
-    faces.push_back(f.Current());
+  const std::vector<TopoDS_Shape> faces = free_faces_in(content);
   int beside = static_cast<int>(faces.size());
   if (out.empty()) {
     if (faces.empty()) throw ShapeError("holds no solid and no face");
@@ -533,37 +544,37 @@ void add_bounds_of_spheres(bool add) {
 
 // The solids of two readings of a file: of the second those that are not sound in the first, and free faces.
 TopoDS_Shape sound_ones(const TopoDS_Shape& first, const TopoDS_Shape& second) {
-  std::vector<TopoDS_Shape> a, b;
-  for (TopExp_Explorer s(first, TopAbs_SOLID); s.More(); s.Next()) a.push_back(s.Current());
-  for (TopExp_Explorer s(second, TopAbs_SOLID); s.More(); s.Next()) b.push_back(s.Current());
+  const std::vector<TopoDS_Shape> a = solids_in(first), b = solids_in(second);
   if (a.size() != b.size()) return second;
   TopoDS_Compound out;
   BRep_Builder builder;
   builder.MakeCompound(out);
   for (size_t k = 0; k < a.size(); ++k) builder.Add(out, BRepCheck_Analyzer(a[k]).IsValid() ? a[k] : b[k]);
-  for (TopExp_Explorer f(second, TopAbs_FACE, TopAbs_SOLID); f.More(); f.Next())
-    builder.Add(out, f.Current());
+  for (const TopoDS_Shape& face : free_faces_in(second)) builder.Add(out, face);
   return out;
+}
+
+// All that a file holds.
+TopoDS_Shape transfer(XSControl_Reader& reader, const std::string& file, const std::string& kind) {
+  if (reader.ReadFile(file.c_str()) != IFSelect_RetDone)
+    throw ShapeError("is damaged: " + kind + " can't be parsed");
+  reader.TransferRoots();
+  if (reader.NbShapes() == 0) throw ShapeError("holds no shape, or a damaged one");
+  return reader.OneShape();
 }
 
 std::vector<CadSolid> read_step(const std::string& file, double scale) {
   check_head(file, "ISO-10303-21", "STEP");
-  std::array<STEPControl_Reader, 2> readers;
-  TopoDS_Shape content;
-  for (const bool add : {true, false}) {
-    STEPControl_Reader& reader = readers[add ? 0 : 1];
-    add_bounds_of_spheres(add);
-    if (reader.ReadFile(file.c_str()) != IFSelect_RetDone)
-      throw ShapeError("is damaged: STEP can't be parsed");
-    reader.TransferRoots();
-    if (reader.NbShapes() == 0) throw ShapeError("holds no shape, or a damaged one");
-    const TopoDS_Shape found = reader.OneShape();
-    content = add ? found : sound_ones(content, found);
-    if (add && BRepCheck_Analyzer(found).IsValid()) break;
+  STEPControl_Reader with_bounds, without;
+  add_bounds_of_spheres(true);
+  TopoDS_Shape content = transfer(with_bounds, file, "STEP");
+  if (!BRepCheck_Analyzer(content).IsValid()) {
+    add_bounds_of_spheres(false);
+    content = sound_ones(content, transfer(without, file, "STEP"));
   }
   return solids_of(content, scale, [&](const TopoDS_Shape& solid) {
-    const std::string name = step_name(readers[0], solid);
-    return name.empty() && readers[1].NbShapes() > 0 ? step_name(readers[1], solid) : name;
+    const std::string name = step_name(with_bounds, solid);
+    return name.empty() && without.NbShapes() > 0 ? step_name(without, solid) : name;
   });
 }
 
@@ -578,10 +589,7 @@ std::vector<CadSolid> read_iges(const std::string& file, double scale) {
   std::getline(in, line);
   if (line.size() < 73 || line[72] != 'S') throw ShapeError("is no IGES file");
   IGESControl_Reader reader;
-  if (reader.ReadFile(file.c_str()) != IFSelect_RetDone) throw ShapeError("is damaged: IGES can't be parsed");
-  reader.TransferRoots();
-  if (reader.NbShapes() == 0) throw ShapeError("holds no shape, or a damaged one");
-  return solids_of(reader.OneShape(), scale, no_name);
+  return solids_of(transfer(reader, file, "IGES"), scale, no_name);
 }
 
 std::vector<CadSolid> read_brep(const std::string& file, double scale) {

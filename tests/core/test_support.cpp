@@ -29,7 +29,10 @@ TEST(Support, equals_the_closed_form_on_ellipsoids) {
 TEST(Support, starts_outside_the_patch_or_of_no_number_do_no_harm) {
   Random random(11);
   const double nan = std::numeric_limits<double>::quiet_NaN();
-  for (const ShapePointer& shape : all_shapes()) {
+  std::vector<ShapePointer> shapes = all_shapes();
+  for (const auto& surfaces : {capsule(0.5, 0.5), tablet(1, 0.5, 0.2), egg(1, 1.1, 1.4)})
+    shapes.push_back(make_shape("of revolution", surfaces));
+  for (const ShapePointer& shape : shapes) {
     for (int k = 0; k < 100; ++k) {
       const Vec3 d = random.direction();
       const double best = find_support(*shape, d).h;

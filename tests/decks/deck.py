@@ -18,6 +18,7 @@ import numpy as np
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 BUILD = ROOT / os.environ.get("BUILD", "build")
 PROGRAM = BUILD / "liggghts-nurbs"
+TIME_LIMIT = 900  # s; ends what hangs: nothing else may depend on how fast a machine is
 
 ENVIRONMENT = {"OMPI_ALLOW_RUN_AS_ROOT": "1", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1",
                "OMPI_MCA_rmaps_base_oversubscribe": "1", "OMP_NUM_THREADS": "1",
@@ -54,9 +55,8 @@ class Run:
         return dump_frames(self.read(name))
 
 
-def run(text, ranks=1, files=None, program=None, env=None, timeout=900):
-    """Runs the deck `text`. `files`: name -> text or path, put into the run's directory first. `timeout`, s, ends what hangs:
-    nothing else may depend on how fast a machine is."""
+def run(text, ranks=1, files=None, program=None, env=None, timeout=TIME_LIMIT):
+    """Runs the deck `text`. `files`: name -> text or path, put into the run's directory first."""
     directory = tempfile.TemporaryDirectory(prefix="nurbs-deck-")
     place = pathlib.Path(directory.name)
     (place / "in.deck").write_text(text)
@@ -72,6 +72,12 @@ def run(text, ranks=1, files=None, program=None, env=None, timeout=900):
                           stdout=subprocess.PIPE, stderr=subprocess.STDOUT, stdin=subprocess.DEVNULL, text=True,
                           errors="replace")
     return Run(directory, done.returncode, done.stdout)
+
+
+def nurbs_shape(*arguments, cwd=None):
+    """Runs nurbs-shape: returncode, stdout, stderr."""
+    return subprocess.run([str(BUILD / "nurbs-shape"), *map(str, arguments)], cwd=cwd, stdout=subprocess.PIPE,
+                          stderr=subprocess.PIPE, text=True, timeout=TIME_LIMIT)
 
 
 def run_ok(text, **options):

@@ -109,7 +109,7 @@ class Crowds(unittest.TestCase):
                   "compute p all reduce sum v_h\n")
         text = self.start("f f f", 0.4, "particles_in_region 200") + walls
         text += MOTION.replace("ke c_r", "ke c_r c_p") + "velocity all set NULL NULL 2 sum yes\nrun 1000\n" * KICKS
-        run = deck.run_ok(text.replace("atom_style", "processors 2 1 1\natom_style"), ranks=2, files=self.files, timeout=900 + 10 * KICKS)
+        run = deck.run_ok(text.replace("atom_style", "processors 2 1 1\natom_style"), ranks=2, files=self.files, timeout=deck.TIME_LIMIT + 10 * KICKS)
         worst = 0
         for table in run.tables[2:]:
             total = self.energies(table)

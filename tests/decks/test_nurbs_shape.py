@@ -4,13 +4,12 @@ import json
 import math
 import pathlib
 import re
-import subprocess
 import tempfile
 import unittest
 
 import deck
 
-PROGRAM = str(deck.BUILD / "nurbs-shape")
+call = deck.nurbs_shape
 INERTIA = "1.0,0.9,0.8,-0.04,0.02,0.09"
 KINDS = [["sphere", "--radius", "2"], ["ellipsoid", "--axes", "1,2,3"], ["fitted-ellipsoid", "--axes", "1,2,3"],
          ["fitted-ellipsoid", "--axes", "1,2,3", "--spans", "2"], ["smooth-ellipsoid", "--axes", "1,2,3"], ["pebble"],
@@ -69,10 +68,6 @@ BAD = [(["cone"], "cone"),
        (["inertia", "--inertia", INERTIA], "--mass or --density is missing"),
        (["inertia", "--inertia", "1,1,3,0,0,0", "--mass", "1"], "less than the sum of the other two"),
        (["inertia", "--inertia", INERTIA, "--mass", "1", "--density", "1"], "--density is 1, must be within 0.1 %")]
-
-
-def call(*arguments):
-    return subprocess.run([PROGRAM, *arguments], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, timeout=900)
 
 
 class NurbsShape(unittest.TestCase):
@@ -239,8 +234,7 @@ class NurbsShape(unittest.TestCase):
             self.assertEqual(words[:len(arguments)], arguments)
             if arguments == ["import"]:
                 (self.place / "grain.step").rename(self.place / "part.step")
-            run = subprocess.run([PROGRAM, *words], cwd=self.place, stdout=subprocess.PIPE, stderr=subprocess.PIPE,
-                                 text=True, timeout=900)
+            run = call(*words, cwd=self.place)
             self.assertEqual((run.returncode, run.stderr), (0, ""), examples[0])
             if "-o" in words and arguments != ["make", "pebbles"]:
                 self.assertTrue((self.place / words[words.index("-o") + 1]).exists(), examples[0])

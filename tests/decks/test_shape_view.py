@@ -3,7 +3,6 @@
 import pathlib
 import re
 import struct
-import subprocess
 import tempfile
 import unittest
 
@@ -12,12 +11,7 @@ import numpy as np
 import deck
 import meshes
 
-PROGRAM = str(deck.BUILD / "nurbs-shape")
-
-
-def call(*arguments):
-    return subprocess.run([PROGRAM, *map(str, arguments)], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
-                          timeout=900)
+call = deck.nurbs_shape
 
 
 class View(unittest.TestCase):
