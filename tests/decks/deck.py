@@ -5,6 +5,8 @@
     run.thermo["KinEng"]                # last thermo table, column by column (numpy); run.tables: all of them
     run.read("out.data"), run.dump("dump.txt")
 """
+import contextlib
+import fcntl
 import json
 import os
 import pathlib
@@ -23,6 +25,7 @@ TIME_LIMIT = 900  # s; ends what hangs: nothing else may depend on how fast a ma
 ENVIRONMENT = {"OMPI_ALLOW_RUN_AS_ROOT": "1", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1",
                "OMPI_MCA_rmaps_base_oversubscribe": "1", "OMP_NUM_THREADS": "1",
                "OMPI_MCA_mpi_yield_when_idle": "1",  # waiting ranks let others run: ten times faster on busy cores
+               "OMPI_MCA_pml": "ob1", "OMPI_MCA_ess_singleton_isolated": "1",  # ask for no network hardware: 0.3 s a start
                "OMPI_MCA_opal_signal": ""}  # Open MPI's crash handler can hang for ever where a crash should end the run
 
 
@@ -55,6 +58,29 @@ class Run:
         return dump_frames(self.read(name))
 
 
+@contextlib.contextmanager
+def cores(ranks):
+    """A core for one rank, all for several: they wait for each other at every step, and beside others ten times as long.
+    CORES, a directory of one file a core, is given by tests/run; without it nothing is shared."""
+    with contextlib.ExitStack() as taken:
+        files = [taken.enter_context(open(p)) for p in sorted(pathlib.Path(os.environ["CORES"]).iterdir())] \
+            if "CORES" in os.environ else []
+        if ranks > 1:
+            for file in files:
+                fcntl.flock(file, fcntl.LOCK_EX)
+        elif files:
+            take_one(files)
+        yield
+
+
+def take_one(files):
+    """Locks the first file that is free; all being taken, one that this process always waits for."""
+    for file in files:
+        with contextlib.suppress(BlockingIOError):
+            return fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    fcntl.flock(files[os.getpid() % len(files)], fcntl.LOCK_EX)
+
+
 def run(text, ranks=1, files=None, program=None, env=None, timeout=TIME_LIMIT):
     """Runs the deck `text`. `files`: name -> text or path, put into the run's directory first."""
     directory = tempfile.TemporaryDirectory(prefix="nurbs-deck-")
@@ -68,9 +94,10 @@ def run(text, ranks=1, files=None, program=None, env=None, timeout=TIME_LIMIT):
     command = [str(program or PROGRAM), "-in", "in.deck", "-log", "log.liggghts"]
     if ranks > 1:
         command = ["mpirun", "-np", str(ranks)] + command
-    done = subprocess.run(command, cwd=place, env={**os.environ, **ENVIRONMENT, **(env or {})}, timeout=timeout,
-                          stdout=subprocess.PIPE, stderr=subprocess.STDOUT, stdin=subprocess.DEVNULL, text=True,
-                          errors="replace")
+    with cores(ranks):
+        done = subprocess.run(command, cwd=place, env={**os.environ, **ENVIRONMENT, **(env or {})}, timeout=timeout,
+                              stdout=subprocess.PIPE, stderr=subprocess.STDOUT, stdin=subprocess.DEVNULL, text=True,
+                              errors="replace")
     return Run(directory, done.returncode, done.stdout)
 
 
