@@ -9,10 +9,10 @@
 A picture is drawn beside the CSV (default: scene.csv or scene_tolerance.csv in BUILD/scene).
 
 Cases: sphere (the host's own), nurbs-sphere, ellipsoid (1 : 1.5 : 2), pebble, blocky (exponent 4), tablet (flat
-faces, rounded rims), and, where the
-environment says LIGGGHTS_SUPERQUADRIC=program, superquadric-ellipsoid and superquadric-blocky. All particles have the
-volume of a sphere of 5 mm and the same linear law; the decks are bench/decks/in.*. A bed is a lattice, turned at
-random, dropped into a box of six planes and settled; then the lid comes down to 1.4 times its height. Every shape's bed
+faces, rounded rims), and, where the environment says LIGGGHTS_SUPERQUADRIC=program, superquadric-ellipsoid and
+superquadric-blocky. All particles have the volume of a sphere of 5 mm and the same linear law; the decks are
+bench/decks/in.*. A bed is a lattice, turned at random, dropped into a box of six planes and settled (above 10,000
+particles: 4 x 4 such beds side by side in one box); then the lid comes down to 1.4 times its height. Every shape's bed
 is made once (DIR, default build/scene) and every program starts from it: the sphere's bed is converted to the host's
 spheres, the others' to superquadrics. Each program lets it relax, and saves a restart, from which timed runs begin:
 
@@ -59,6 +59,7 @@ import deck  # noqa: E402
 RADIUS, DENSITY, GRAVITY, DT = 0.005, 2500.0, 9.81, 5e-5  # dt and the law stand in the decks too
 VOLUME = 4 / 3 * math.pi * RADIUS**3
 SETTLE, RELAX, TURN, WARM = 15000, 2000, 4000, 100  # steps: of the drop; to rest, then to tumbling; before timing
+MOST_SETTLED, TILES = 10000, 4  # larger beds are 4 x 4 smaller ones
 TURNS = {"rest": 0, "tumbling": 1}  # of gravity, a second
 
 SHAPES = {  # arguments of nurbs-shape make
@@ -225,9 +226,34 @@ class Bed:
 
     def __init__(self, shape_name, count, program, directory, seed=7):
         self.path = pathlib.Path(directory) / f"{shape_name}-{count}"
-        self.count, self.width, self.shape_name = count, box_width(count), shape_name
+        self.count, self.shape_name = count, shape_name
         self.path.mkdir(parents=True, exist_ok=True)
         self.shape = Shape(shape_name, self.path)
+        if count > MOST_SETTLED and count % TILES**2 == 0:
+            self.tile(Bed(shape_name, count // TILES**2, program, directory, seed))
+        else:
+            self.settle(program, seed)
+        top = max(float(row[7]) for row in self.rows["Atoms"]) + RADIUS
+        self.lid = round(1.4 * top, 4)
+        self.convert()
+
+    def tile(self, bed):
+        """TILES x TILES of a smaller bed, side by side without walls between them."""
+        self.width, self.key = TILES * bed.width, bed.key
+        self.rows = {title: [] for title in bed.rows}
+        for i in range(TILES**2):
+            first, shift = i * bed.count, (i % TILES * bed.width, i // TILES * bed.width)
+            for title, rows in bed.rows.items():
+                for row in rows:
+                    moved = [str(int(row[0]) + first), *row[1:]]
+                    if title == "Atoms":
+                        moved[5:7] = (repr(float(x) + s) for x, s in zip(row[5:7], shift))
+                    self.rows[title].append(moved)
+
+    def settle(self, program, seed):
+        """Drops a lattice, if that was not done before."""
+        count, shape_name = self.count, self.shape_name
+        self.width = box_width(count)
         text, height = lattice(self.shape, count, self.width, seed)
         key = hashlib.sha1((text + (DECKS / "in.settle").read_text() + str(SETTLE)).encode()).hexdigest()[:10]
         self.data = self.path / f"bed-{key}.data"
@@ -242,9 +268,6 @@ class Bed:
             fresh.rename(self.data)
         self.key = key
         self.rows = sections(self.data.read_text())
-        top = max(float(row[7]) for row in self.rows["Atoms"]) + RADIUS
-        self.lid = round(1.4 * top, 4)
-        self.convert()
 
     def convert(self):
         """Writes nurbs.data, sphere.data, superquadric.data and turned, in a box up to the lid."""
