@@ -100,6 +100,15 @@ double cross(const Angle& x, const Angle& y) {
   return x.c * y.s - x.s * y.c;
 }
 
+// Half way between two angles of [0, pi], low first.
+Angle middle(const Angle& low, const Angle& high) {
+  Angle sum{low.c + high.c, low.s + high.s};
+  if (square(sum.c) + square(sum.s) < 1)
+    sum = {high.s - low.s, low.c - high.c};  // square to their difference
+  const double length = std::sqrt(square(sum.c) + square(sum.s));
+  return {sum.c / length, sum.s / length};
+}
+
 // An angle between `above` and `below` up to which r s + z c, that high at them, is at least `threshold`: it
 // is linear along the chord.
 Angle level_at(const Angle& above, const Angle& below, double high, double low, double threshold) {
@@ -420,11 +429,14 @@ class RingSearch {
   //     |by alpha and phi| <= tilt (1 / |e x b| + |y| |cos alpha| / |e x b| + y^2 / |e x b|^3).
   // Where a meridian is known to bend by no less than R between the circles and in the sector (inner_map.h),
   // the body holds the balls of that radius that touch there from inside: circles of their centres, and R
-  // more. `narrower`: the angles should be halved rather than the azimuths.
+  // more. `narrower`: the angles should be halved rather than the azimuths; they are where they reach far, as
+  // from one minimum to another.
   double second_order(const Sector& sector, const Least& here, bool* narrower) const {
-    *narrower = false;
     const Vec3 u = outward(sector.phi), across = view_.axis.cross(u);
     const double c = here.at.c, s = here.at.s;
+    const auto too_far = [&](const Angle& a) { return !(c * a.c + s * a.s > kWidestSecond); };
+    *narrower = too_far(sector.low) || too_far(sector.high);
+    if (*narrower) return -kFarAway;
     const Reach over = reach_of(sector);
     Facing m{1, Vec3::Zero()};
     double turned = 0;
@@ -459,8 +471,6 @@ class RingSearch {
                  twist = over.cosine * along + rho * tilt * ((1 + cosine * over.cosine) * inverse + cube);
     // Along the angles a sine, least at an end or, where it bends upwards, in between.
     double least = kFarAway;
-    for (const Angle* a : {&sector.low, &sector.high})
-      if (!(c * a->c + s * a->s > kWidestSecond)) return -kFarAway;
     for (const double side : {t - kChord * twist * h, t + kChord * twist * h}) {
       const auto at = [&](const Angle& a, double* slope) {
         const double cd = c * a.c + s * a.s, sd = c * a.s - s * a.c;
@@ -507,10 +517,7 @@ class RingSearch {
         if (top > kDeepestSector) return false;
         Sector other = sector;
         if (narrower) {
-          Angle middle{sector.low.c + sector.high.c, sector.low.s + sector.high.s};
-          const double length = std::sqrt(square(middle.c) + square(middle.s));
-          middle = {middle.c / length, middle.s / length};
-          sector.high = other.low = middle;
+          sector.high = other.low = middle(sector.low, sector.high);
         } else {
           sector.half = other.half = 0.5 * sector.half;
           sector.phi -= sector.half;
