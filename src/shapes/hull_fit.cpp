@@ -47,10 +47,11 @@ constexpr double kAim = 0.97, kOutwardAim = 0.93;  // of a tolerance, left to sa
 // Distance from its ray that costs a point as much as an error of the tolerance: free too early, the points
 // crowd.
 constexpr double kFirstSlide = 0.05, kFreeSlide = 0.15;
-constexpr size_t kMostFaces = 60;  // of a polyhedron with rounded edges ...
-constexpr int kRoundings = 2;      // ... whose radius is found by the distance of the first one
-constexpr int kHalvings = 12;      // ... and that is halved where it fits nowhere
-constexpr int kRimPoints = 96;     // of a circle, at which its distance from the hull is looked at
+constexpr double kPlaneShare = 0.02;  // of the tolerance: faces that are plane to this may be one
+constexpr size_t kMostFaces = 60;     // of a polyhedron with rounded edges ...
+constexpr int kRoundings = 2;         // ... whose radius is found by the distance of the first one
+constexpr int kHalvings = 12;         // ... and that is halved where it fits nowhere
+constexpr int kRimPoints = 96;        // of a circle, at which its distance from the hull is looked at
 constexpr double kRimCut = 0.7,
                  kChordCut = 0.25;    // of the tolerance: what corners and a coarser profile take
 constexpr size_t kMostProfile = 400;  // corners of the hull's own profile ...
@@ -413,11 +414,21 @@ class HullFitter {
   }
 
   // The hull of a few faces with its edges rounded, as far as its corners allow: creases are dear to splines.
+  // Rounded coordinates far from the origin leave faces less plane than single precision does near it.
   bool try_polyhedron() {
     if (polyhedron_tried_) return false;
     polyhedron_tried_ = true;
-    const std::vector<HalfSpace> faces = facets(hull_, kMostFaces);
-    if (faces.empty()) return false;
+    size_t tried = 0;
+    for (double roundoff : {std::max(kSingleRoundoff, kPlaneShare * options_.tolerance), kSingleRoundoff}) {
+      const std::vector<HalfSpace> faces = facets(hull_, kMostFaces, roundoff);
+      if (faces.empty() || faces.size() == tried) continue;
+      tried = faces.size();
+      if (try_rounded(faces)) return true;
+    }
+    return false;
+  }
+
+  bool try_rounded(const std::vector<HalfSpace>& faces) {
     const std::string kind = "polyhedron of " + std::to_string(faces.size()) + " faces with rounded edges";
     const auto rounded = [&](double rounding) {
       return make_shape("fit", rounded_polyhedron(faces, mass_.center, rounding));

@@ -24,7 +24,8 @@ struct Arguments {
   std::string file, output, tolerance = "0.1%", unit = "mm";
 };
 
-constexpr int kMostCells = 400;  // of an STL grid, per Bezier patch parameter
+constexpr double kSingle = 6e-8, kStepShare = 0.1;  // round-off of STL; of the tolerance, at most
+constexpr int kMostCells = 400;                     // of an STL grid, per Bezier patch parameter
 
 std::shared_ptr<const Shape> load(const std::string& file) {
   std::vector<std::string> warnings;
@@ -66,16 +67,16 @@ void put(std::string& out, const Vec3& v) {
   }
 }
 
-// Binary STL. All patches share one number of cells per parameter, so that edges meet.
-std::string stl(const Shape& shape, double error, size_t* count) {
+// Binary STL of the body, its centre of mass at `place`. All patches share one number of cells per parameter,
+// so that edges meet.
+std::string stl(const Shape& shape, const Vec3& place, double error, size_t* count) {
   int cells = 2;
   for (const BezierPatch& patch : shape.patches) cells = std::max(cells, cells_for(patch, error));
   std::string body;
   std::uint32_t triangles = 0;
   for (const BezierPatch& patch : shape.patches) {
     const auto at = [&](int i, int j) {
-      return Vec3(evaluate0(patch, static_cast<double>(i) / cells, static_cast<double>(j) / cells) +
-                  shape.mass.center);
+      return Vec3(evaluate0(patch, static_cast<double>(i) / cells, static_cast<double>(j) / cells) + place);
     };
     for (int i = 0; i < cells; ++i)
       for (int j = 0; j < cells; ++j) {
@@ -128,8 +129,14 @@ void export_shape(const Arguments& a) {
     std::printf("%s: %zu exact cells\n", a.output.c_str(), shape->patches.size());
     return;
   }
+  Vec3 place = shape->mass.center;
+  if (kSingle * place.norm() > kStepShare * share * shape->bounding_radius) {
+    std::printf("%s: far from the origin; the triangles lie about it, moved by %.17g %.17g %.17g\n",
+                a.file.c_str(), -place[0], -place[1], -place[2]);
+    place.setZero();
+  }
   size_t triangles = 0;
-  write_whole(a.output, stl(*shape, share * shape->bounding_radius, &triangles));
+  write_whole(a.output, stl(*shape, place, share * shape->bounding_radius, &triangles));
   std::printf("%s: %zu triangles\n", a.output.c_str(), triangles);
 }
 
@@ -161,7 +168,7 @@ void view(const Arguments& a) {
   } else {
     const std::string mesh = a.output + "." + std::to_string(getpid()) + ".stl", draft = mesh + ".png";
     size_t triangles = 0;
-    write_whole(mesh, stl(*shape, 1e-3 * shape->bounding_radius, &triangles));
+    write_whole(mesh, stl(*shape, Vec3::Zero(), 1e-3 * shape->bounding_radius, &triangles));
     const std::string command = "/usr/bin/python3 -W ignore " + quoted(find_script()) + " " + quoted(draft) +
                                 " " + quoted(mesh) + " >/dev/null 2>&1";
     const int status = std::system(command.c_str());
