@@ -265,6 +265,14 @@ class Fit(unittest.TestCase):
             self.assert_near(points * axes, 0.03)
             self.assertLess(abs(float(re.search(r"against the mesh: volume ([-+]\S+) %", said)[1])), 6)
 
+    def test_thin_bodies_keep_their_volume(self):
+        """A body within the tolerance may be far too thick: a stricter one is taken where there is one."""
+        for (points, faces), axes in ((meshes.prism(6), (1, 1, 1000)), (meshes.prism(64), (1, 0.03, 0.001))):
+            told = self.fit(points * axes, faces, "--tolerance", "5%" if axes[2] > 1 else "1%")
+            self.assertIn("its volume is off", told)
+            self.assertLess(abs(float(re.search(r"against the mesh: volume ([-+]\S+) %", told)[1])), 10)
+            self.assert_near(points * axes, 0.05)
+
     def test_sharp_edges_keep_their_flat_faces(self):
         """Cylinders and cones become bodies of revolution, polyhedra keep their faces: edges rounded, few points."""
         for name, (points, faces), most in (("cylinder", meshes.prism(64), 120), ("cone", meshes.cone(64), 120),
