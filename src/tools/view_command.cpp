@@ -67,6 +67,23 @@ void put(std::string& out, const Vec3& v) {
   }
 }
 
+// Point (i, j) of a grid over a patch; on an edge that of the first of its two patches, whose parameters may
+// run otherwise, so that triangles meet.
+Vec3 grid_point(const Shape& shape, int patch, int i, int j, int cells) {
+  const auto inside = [cells](int k) { return k > 0 && k < cells; };
+  if (inside(i) != inside(j)) {
+    const int edge = inside(j) ? (i > 0 ? 1 : 0) : (j > 0 ? 3 : 2), k = inside(j) ? j : i;
+    const EdgeLink& link = shape.links[patch][edge];
+    if (!link.collapsed && link.patch >= 0 && std::pair(link.patch, link.edge) < std::pair(patch, edge)) {
+      const int there = link.reversed ? cells - k : k, end = link.edge % 2 ? cells : 0;
+      patch = link.patch;
+      i = link.edge < 2 ? end : there;
+      j = link.edge < 2 ? there : end;
+    }
+  }
+  return evaluate0(shape.patches[patch], static_cast<double>(i) / cells, static_cast<double>(j) / cells);
+}
+
 // Binary STL of the body, its centre of mass at `place`. All patches share one number of cells per parameter,
 // so that edges meet.
 std::string stl(const Shape& shape, const Vec3& place, double error, size_t* count) {
@@ -74,10 +91,8 @@ std::string stl(const Shape& shape, const Vec3& place, double error, size_t* cou
   for (const BezierPatch& patch : shape.patches) cells = std::max(cells, cells_for(patch, error));
   std::string body;
   std::uint32_t triangles = 0;
-  for (const BezierPatch& patch : shape.patches) {
-    const auto at = [&](int i, int j) {
-      return Vec3(evaluate0(patch, static_cast<double>(i) / cells, static_cast<double>(j) / cells) + place);
-    };
+  for (int patch = 0; patch < static_cast<int>(shape.patches.size()); ++patch) {
+    const auto at = [&](int i, int j) { return Vec3(grid_point(shape, patch, i, j, cells) + place); };
     for (int i = 0; i < cells; ++i)
       for (int j = 0; j < cells; ++j) {
         const Vec3 p[4] = {at(i, j), at(i + 1, j), at(i + 1, j + 1), at(i, j + 1)};

@@ -242,6 +242,15 @@ class Fit(unittest.TestCase):
         self.assertEqual(made.returncode, 0, made.stderr)
         self.assertIn("82 patches", made.stdout)
 
+    def test_exported_triangles_close(self):
+        """Also where two patches run along their common edge by other parameters."""
+        for solid in ("cube", "tetrahedron"):
+            made = call("make", "rounded-polyhedron", "--solid", solid, "--rounding", "0.1", self.place / "solid.json")
+            self.assertEqual(made.returncode, 0, made.stderr)
+            self.assertEqual(call("export", self.place / "solid.json", "-o", self.place / "solid.stl").returncode, 0)
+            run = call("fit", self.place / "solid.stl", "--tolerance", "20%", "-o", self.out)
+            self.assertEqual(run.returncode, 0, run.stderr)
+
     def test_thin_plates(self):
         """Thinner than the tolerance would round their edges: as round as they can be."""
         points, faces = meshes.prism(4)
