@@ -295,6 +295,9 @@ constexpr char kFitNotes[] =
     "and polyhedra of up to 60 faces, keep their flat faces and get edges as round as the tolerance allows. "
     "Other bodies\n"
     "with sharp edges want many points: take them from `make` or `import`.\n"
+    "It lies where the mesh does; from so far away that its coordinates would lose digits it is moved to the "
+    "origin,\n"
+    "by what is printed.\n"
     "Example: nurbs-shape fit grain.stl --tolerance 2% -o grain.json\n";
 
 }  // namespace
