@@ -47,15 +47,20 @@ constexpr double kAim = 0.97, kOutwardAim = 0.93;  // of a tolerance, left to sa
 // Distance from its ray that costs a point as much as an error of the tolerance: free too early, the points
 // crowd.
 constexpr double kFirstSlide = 0.05, kFreeSlide = 0.15;
-constexpr size_t kMostFaces = 60;  // of a polyhedron with rounded edges ...
-constexpr int kRoundings = 2;      // ... whose radius is found by the distance of the first one
-constexpr int kHalvings = 12;      // ... and that is halved where it fits nowhere
-constexpr int kRimPoints = 96;     // of a circle, at which its distance from the hull is looked at
+constexpr double kPlaneShare = 0.02;  // of the tolerance: faces that are plane to this may be one
+constexpr size_t kMostFaces = 60;     // of a polyhedron with rounded edges ...
+constexpr int kRoundings = 2;         // ... whose radius is found by the distance of the first one
+constexpr int kHalvings = 12;         // ... and that is halved where it fits nowhere
+constexpr int kRimPoints = 96;        // of a circle, at which its distance from the hull is looked at
 constexpr double kRimCut = 0.7,
                  kChordCut = 0.25;    // of the tolerance: what corners and a coarser profile take
 constexpr size_t kMostProfile = 400;  // corners of the hull's own profile ...
 constexpr size_t kMostCorners = 12;   // ... and of the coarser one: rounder bodies are for splines
-constexpr double kThin = 2;
+// Half a body's thickness over the tolerance, below which errors across it count as if it were so thick: by
+// up to 1 / kThin of the thickness. Where that leaves another volume, a stricter fit is tried.
+constexpr double kThin = 2, kStrictThin = 10;
+constexpr double kVolumeError = 0.1;
+constexpr size_t kStrictPoints = 602;  // seconds
 constexpr int kClosestSteps = 40;
 constexpr double kClosestStride = 0.3;  // parameters
 constexpr int kMostPieces = 200000;
@@ -163,11 +168,20 @@ struct Frame {
   Mat3 to, from, metric;
 };
 
-Frame even_frame(const MassProperties& mass, double tolerance) {
+Eigen::SelfAdjointEigenSolver<Mat3> principal_axes(const MassProperties& mass) {
   const Mat3 gyration = mass.inertia / mass.volume;
   const Mat3 covariance = 0.5 * gyration.trace() * Mat3::Identity() - gyration;
-  const Eigen::SelfAdjointEigenSolver<Mat3> axes(5 * covariance);
-  const Vec3 lengths = axes.eigenvalues().cwiseSqrt().cwiseMax(kThin * tolerance);
+  return Eigen::SelfAdjointEigenSolver<Mat3>(5 * covariance);
+}
+
+// Semi-axes of the ellipsoid of the same moments, ascending.
+Vec3 principal_lengths(const MassProperties& mass) {
+  return principal_axes(mass).eigenvalues().cwiseMax(0).cwiseSqrt();
+}
+
+Frame even_frame(const MassProperties& mass, double tolerance, double thin) {
+  const Eigen::SelfAdjointEigenSolver<Mat3> axes = principal_axes(mass);
+  const Vec3 lengths = principal_lengths(mass).cwiseMax(thin * tolerance);
   const Mat3 metric =
       axes.eigenvectors() * lengths.cwiseInverse().asDiagonal() * axes.eigenvectors().transpose();
   return {mass.center, axes.operatorInverseSqrt(), axes.operatorSqrt(), metric};
@@ -301,11 +315,11 @@ std::string percent(double x) {
 
 class HullFitter {
  public:
-  HullFitter(const ConvexHull& hull, const HullFitOptions& options)
-      : hull_(hull), options_(options), mass_(hull.properties()) {
+  HullFitter(const ConvexHull& hull, const HullFitOptions& options, double thin, double volume_error)
+      : hull_(hull), options_(options), volume_error_(volume_error), mass_(hull.properties()) {
     radius_ = bounding_radius(hull, mass_.center);
     tolerance_ = options.tolerance * radius_;
-    frame_ = even_frame(mass_, tolerance_);
+    frame_ = even_frame(mass_, tolerance_, thin);
   }
 
   HullFit run() {
@@ -413,11 +427,21 @@ class HullFitter {
   }
 
   // The hull of a few faces with its edges rounded, as far as its corners allow: creases are dear to splines.
+  // Rounded coordinates far from the origin leave faces less plane than single precision does near it.
   bool try_polyhedron() {
     if (polyhedron_tried_) return false;
     polyhedron_tried_ = true;
-    const std::vector<HalfSpace> faces = facets(hull_, kMostFaces);
-    if (faces.empty()) return false;
+    size_t tried = 0;
+    for (double roundoff : {std::max(kSingleRoundoff, kPlaneShare * options_.tolerance), kSingleRoundoff}) {
+      const std::vector<HalfSpace> faces = facets(hull_, kMostFaces, roundoff);
+      if (faces.empty() || faces.size() == tried) continue;
+      tried = faces.size();
+      if (try_rounded(faces)) return true;
+    }
+    return false;
+  }
+
+  bool try_rounded(const std::vector<HalfSpace>& faces) {
     const std::string kind = "polyhedron of " + std::to_string(faces.size()) + " faces with rounded edges";
     const auto rounded = [&](double rounding) {
       return make_shape("fit", rounded_polyhedron(faces, mass_.center, rounding));
@@ -514,7 +538,7 @@ class HullFitter {
         GaugeFit fit = fit_gauge(degree, spans, even, options);
         gauge_error_ = fit.error * kAim * tolerance_;
         gauge_spans_ = spans;
-        if (fit.error > 1) break;
+        if (fit.error > 1 / kAim) break;  // the certificate decides
         transform(fit.surfaces, frame_.from, frame_.center);
         if (judge(std::move(fit.surfaces), kind)) return true;
         if (judged_.worst() <= tolerance_) return false;
@@ -583,6 +607,7 @@ class HullFitter {
     say(kind + ": within " + percent(error) + radii);
     least_ = std::min(least_, error);
     if (error > options_.tolerance) return false;
+    if (std::abs(now.shape->mass.volume / mass_.volume - 1) > volume_error_) return false;
     const bool proven = (convex || now.shape->proofs.convex) && now.shape->patch_curvature.min_radius > 0;
     if (proven || !best_.shape) best_ = std::move(now);
     return proven;
@@ -594,6 +619,7 @@ class HullFitter {
 
   const ConvexHull& hull_;
   const HullFitOptions& options_;
+  double volume_error_;  // of bodies that are taken, at the most
   MassProperties mass_;
   Frame frame_;
   static constexpr double kFar = 1e299;
@@ -617,12 +643,33 @@ HullDistance hull_distance(const Shape& shape, const ConvexHull& hull, double re
   return out;
 }
 
+namespace {
+
+HullFit fit_near_one(const ConvexHull& hull, const HullFitOptions& options) {
+  HullFit fit = HullFitter(hull, options, kThin, 1e300).run();
+  const MassProperties own = hull.properties();
+  const auto error = [&](const HullFit& f) { return std::abs(f.shape->mass.volume / own.volume - 1); };
+  const bool thin = principal_lengths(own)[0] < kThin * options.tolerance * fit.radius;
+  if (!thin || error(fit) < kVolumeError) return fit;
+  if (options.progress) options.progress("its volume is off by " + percent(error(fit)) + ":");
+  HullFitOptions few = options;
+  few.most_points = options.most_points > 0 ? std::min(options.most_points, kStrictPoints) : kStrictPoints;
+  try {
+    HullFit strict = HullFitter(hull, few, kStrictThin, kVolumeError).run();
+    if (error(strict) < error(fit)) return strict;
+  } catch (const ShapeError&) {  // a body that is so thin wants more points than that
+  }
+  return fit;
+}
+
+}  // namespace
+
 // At a scale at which the radius is about 1, so that no unit of length is too small or too large.
 HullFit fit_hull(const ConvexHull& hull, const HullFitOptions& options) {
   const int power = std::ilogb(std::sqrt(2.0) * bounding_radius(hull, hull.properties().center));
-  if (power == 0) return HullFitter(hull, options).run();
+  if (power == 0) return fit_near_one(hull, options);
   const ConvexHull near_one = hull.image(std::ldexp(1.0, -power) * Mat3::Identity(), Vec3::Zero());
-  HullFit fit = HullFitter(near_one, options).run();
+  HullFit fit = fit_near_one(near_one, options);
   const double scale = std::ldexp(1.0, power);
   transform(fit.surfaces, scale * Mat3::Identity(), Vec3::Zero());
   fit.shape = make_shape("fit", fit.surfaces);

@@ -14,7 +14,6 @@
 namespace nurbs {
 namespace {
 
-constexpr double kSamePlane = 1e-6;  // of distances from a plane over the extent
 constexpr double kSameSide = 0.9;    // cosine of normals: narrow triangles within a plane have poor ones
 constexpr double kSamePoint = 1e-9;  // of the extent
 
@@ -323,7 +322,7 @@ class Rounder {
 
 }  // namespace
 
-std::vector<HalfSpace> facets(const ConvexHull& hull, size_t most) {
+std::vector<HalfSpace> facets(const ConvexHull& hull, size_t most, double roundoff) {
   const std::vector<Vec3>& points = hull.mesh().points;
   const double size = extent(points);
   struct Facet {
@@ -344,7 +343,7 @@ std::vector<HalfSpace> facets(const ConvexHull& hull, size_t most) {
     for (const int k : f.corners) h = std::max(h, n.dot(points[k]));
     const auto same = [&](const HalfSpace& s) {
       return s.normal.dot(n) > kSameSide && std::all_of(f.corners.begin(), f.corners.end(), [&](int k) {
-               return std::abs(s.offset - s.normal.dot(points[k])) < kSamePlane * size;
+               return std::abs(s.offset - s.normal.dot(points[k])) < roundoff * size;
              });
     };
     if (std::any_of(out.begin(), out.end(), same)) continue;

@@ -15,9 +15,11 @@ struct HalfSpace {
   double offset;
 };
 
-// The facets of a hull, those in one plane (to 1e-6, as single precision leaves them) once; empty when there
-// are more than `most`.
-std::vector<HalfSpace> facets(const ConvexHull& hull, size_t most);
+constexpr double kSingleRoundoff = 1e-6;
+
+// The facets of a hull, those in one plane, to `roundoff` of the extent, once; empty when there are more than
+// `most`.
+std::vector<HalfSpace> facets(const ConvexHull& hull, size_t most, double roundoff = kSingleRoundoff);
 
 // Those of a Platonic solid with corners on the sphere of `radius` about the origin: tetrahedron, cube,
 // octahedron, dodecahedron, icosahedron. Empty for another name.

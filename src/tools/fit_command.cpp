@@ -20,6 +20,7 @@ constexpr double kFinest = 2e-4, kCoarsest = 0.5;
 constexpr double kWeld = 1e-7;                              // of the extent: points closer are one
 constexpr double kLeastExtent = 1e-29, kMostExtent = 1e29;  // a shape file's are 1e-30 to 1e30
 constexpr double kFarthest = 1e9;                           // of the extent: distance from the origin
+constexpr double kSurelyKept = 10, kFarthestKept = 1e3;     // radii from the origin at which a body is left
 constexpr int kSampleGrid =
     64;  // per patch parameter of a body to simplify, over all Bezier patches of a side
 
@@ -91,6 +92,19 @@ int spans_of(const std::string& patches) {
   throw UsageError("--patches is " + patches + ", must be 6, 24, 54, 96, 216, 384, 600 or 864");
 }
 
+Vec3 middle(const TriangleMesh& mesh) {
+  Eigen::AlignedBox3d box;
+  for (const Vec3& p : mesh.points) box.extend(p);
+  return box.center();
+}
+
+// Whether coordinates that lost digits tell less of a body, by which contacts are found.
+bool is_worse(const Shape& a, const Shape& b) {
+  return (b.smooth && !a.smooth) || (b.proofs.convex && !a.proofs.convex) ||
+         (b.proofs.sphere && !a.proofs.sphere) || (b.ellipsoid.found && !a.ellipsoid.found) ||
+         a.patch_curvature.min_radius < 0.5 * b.patch_curvature.min_radius;
+}
+
 double worst_kink(const Shape& shape) {
   double worst = 0;
   for (const auto& edges : shape.links)
@@ -125,6 +139,24 @@ HullFit fit_with_progress(const ConvexHull& hull, double tolerance, int spans, s
 
 }  // namespace
 
+std::shared_ptr<const Shape> put_in_place(const std::string& file, const std::string& output,
+                                          const Vec3& place, ShapeFileContent& content) {
+  auto about_origin = make_shape(output, content.surfaces, content.gyration);
+  const double radii = (about_origin->mass.center + place).norm() / about_origin->bounding_radius;
+  if (radii <= kFarthestKept) {
+    std::vector<NurbsSurface> surfaces = content.surfaces;
+    transform(surfaces, Mat3::Identity(), place);
+    auto placed = make_shape(output, surfaces, content.gyration);
+    if (radii <= kSurelyKept || !is_worse(*placed, *about_origin)) {
+      content.surfaces = std::move(surfaces);
+      return placed;
+    }
+  }
+  std::printf("%s: lies %.2g radii from the origin; moved to it, by %.17g %.17g %.17g, for the digits\n",
+              file.c_str(), radii, -place[0], -place[1], -place[2]);
+  return about_origin;
+}
+
 double fit_tolerance(const std::string& command, const std::string& text) {
   const double tolerance = parse_share(command + ": --tolerance", text, kCoarsest);
   if (tolerance < kFinest)
@@ -142,7 +174,9 @@ void fit_mesh(const FitArguments& a, const TriangleMesh& raw) {
     if (a.keep != "volume" && a.keep != "inertia" && a.keep != "volume,inertia" && a.keep != "inertia,volume")
       throw UsageError("fit: --keep is " + a.keep + ", must be volume, inertia or volume,inertia");
   }
-  const TriangleMesh mesh = closed_piece(a, raw);
+  TriangleMesh mesh = closed_piece(a, raw);
+  const Vec3 place = middle(mesh);
+  for (Vec3& p : mesh.points) p -= place;  // all else is about the origin
   const MassProperties own = mesh_properties(mesh);
   if (!(own.volume > 0)) throw ShapeError(a.file + ": encloses no volume");
   std::unique_ptr<ConvexHull> hull;
@@ -163,7 +197,8 @@ void fit_mesh(const FitArguments& a, const TriangleMesh& raw) {
     mass = solid_properties(content.surfaces);
   }
   if (keep_inertia) content.gyration = own.inertia / own.volume;
-  const auto shape = make_shape(a.output, content.surfaces, content.gyration);
+  const auto centered = keep_volume ? make_shape("fit", content.surfaces) : best.shape;
+  const auto shape = put_in_place(a.file, a.output, place, content);
   if (keep_inertia) mass.inertia = own.inertia / own.volume * mass.volume;
   write_whole(a.output, write_shape(content));
   size_t points = 0;
@@ -174,7 +209,7 @@ void fit_mesh(const FitArguments& a, const TriangleMesh& raw) {
               100 * best.distance.outward / best.radius, 100 * best.distance.inward / best.radius,
               best.radius);
   if (keep_volume) {
-    const HullDistance kept = hull_distance(*shape, *hull, 0.01 * tolerance * best.radius);
+    const HullDistance kept = hull_distance(*centered, *hull, 0.01 * tolerance * best.radius);
     std::printf("after scaling to the mesh's volume: %.3g %% outward, %.3g %% inward\n",
                 100 * kept.outward / best.radius, 100 * kept.inward / best.radius);
   }
@@ -186,7 +221,7 @@ void fit_mesh(const FitArguments& a, const TriangleMesh& raw) {
 
 namespace {
 
-// Points of a body on a grid over every Bezier patch, about as dense whatever the patches.
+// Points of a body, about its centre, on a grid over every Bezier patch, about as dense whatever the patches.
 std::vector<Vec3> sample(const Shape& shape) {
   const int n =
       std::clamp(static_cast<int>(kSampleGrid * std::sqrt(6.0 / static_cast<double>(shape.patches.size()))),
@@ -195,8 +230,7 @@ std::vector<Vec3> sample(const Shape& shape) {
   for (const BezierPatch& patch : shape.patches)
     for (int i = 0; i <= n; ++i)
       for (int j = 0; j <= n; ++j)
-        points.push_back(evaluate0(patch, static_cast<double>(i) / n, static_cast<double>(j) / n) +
-                         shape.mass.center);
+        points.push_back(evaluate0(patch, static_cast<double>(i) / n, static_cast<double>(j) / n));
   return points;
 }
 
@@ -209,8 +243,12 @@ size_t control_points(const std::vector<NurbsSurface>& surfaces) {
 void simplify(const FitArguments& a) {
   const double tolerance = parse_share("simplify: --tolerance", a.tolerance, kCoarsest);
   std::vector<std::string> warnings;
-  const auto shape = read_shape_file(a.file, &warnings);
+  const auto read = read_shape_file(a.file, &warnings);
   print_warnings(warnings);
+  const Vec3 place = read->mass.center;
+  std::vector<NurbsSurface> about_origin = read->surfaces;
+  transform(about_origin, Mat3::Identity(), -place);
+  const auto shape = make_shape(a.file, about_origin);
   HullFit best;
   double sag = 0;  // of the body over the hull of its samples
   try {
@@ -229,8 +267,9 @@ void simplify(const FitArguments& a) {
                      std::to_string(control_points(shape->surfaces)) + " control points is within " +
                      format("%.3g", 100 * tolerance) + " % (bounds)");
   ShapeFileContent content{best.surfaces, std::nullopt};
-  if ((shape->gyration - shape->mass.inertia / shape->mass.volume).norm() > 1e-9 * shape->gyration.norm())
-    content.gyration = shape->gyration;  // given in the file
+  if ((read->gyration - read->mass.inertia / read->mass.volume).norm() > 1e-9 * read->gyration.norm())
+    content.gyration = read->gyration;  // given in the file
+  put_in_place(a.file, a.output, place, content);
   write_whole(a.output, write_shape(content));
   std::printf("%s: %s; %zu control points in place of %zu\n", a.output.c_str(), best.kind.c_str(),
               control_points(best.surfaces), control_points(shape->surfaces));
@@ -256,6 +295,9 @@ constexpr char kFitNotes[] =
     "and polyhedra of up to 60 faces, keep their flat faces and get edges as round as the tolerance allows. "
     "Other bodies\n"
     "with sharp edges want many points: take them from `make` or `import`.\n"
+    "It lies where the mesh does; from so far away that its coordinates would lose digits it is moved to the "
+    "origin,\n"
+    "by what is printed.\n"
     "Example: nurbs-shape fit grain.stl --tolerance 2% -o grain.json\n";
 
 }  // namespace

@@ -27,6 +27,7 @@
 #include "shapes/superellipsoid.h"
 #include "tools/command.h"
 #include "tools/contact_cost.h"
+#include "tools/fit_command.h"
 
 namespace {
 
@@ -364,11 +365,17 @@ Body make_rounded_polyhedron(const Options& options) {
   if (options.has("--radius")) options.fail("--radius is for --solid: a mesh has its own size");
   const std::string file = options.text("--mesh");
   try {
-    const ConvexHull hull(read_mesh_file(file).points);
+    std::vector<Vec3> points = read_mesh_file(file).points;
+    Eigen::AlignedBox3d box;
+    for (const Vec3& p : points) box.extend(p);
+    for (Vec3& p : points) p -= box.center();
+    const ConvexHull hull(points);
     const std::vector<HalfSpace> faces = facets(hull, kMostFacets);
     if (faces.empty())
       throw ShapeError("its hull has more than " + std::to_string(kMostFacets) + " faces: use fit");
-    return outward(rounded_polyhedron(faces, hull.properties().center, rounding));
+    ShapeFileContent content{rounded_polyhedron(faces, hull.properties().center, rounding), std::nullopt};
+    put_in_place(file, options.output(), box.center(), content);
+    return outward(std::move(content.surfaces));
   } catch (const ShapeError& error) {
     const std::string what = error.what();
     throw ShapeError(what.rfind(file, 0) == 0 ? what : file + ": " + what);

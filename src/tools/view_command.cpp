@@ -24,7 +24,8 @@ struct Arguments {
   std::string file, output, tolerance = "0.1%", unit = "mm";
 };
 
-constexpr int kMostCells = 400;  // of an STL grid, per Bezier patch parameter
+constexpr double kSingle = 6e-8, kStepShare = 0.1;  // round-off of STL; of the tolerance, at most
+constexpr int kMostCells = 400;                     // of an STL grid, per Bezier patch parameter
 
 std::shared_ptr<const Shape> load(const std::string& file) {
   std::vector<std::string> warnings;
@@ -66,17 +67,32 @@ void put(std::string& out, const Vec3& v) {
   }
 }
 
-// Binary STL. All patches share one number of cells per parameter, so that edges meet.
-std::string stl(const Shape& shape, double error, size_t* count) {
+// Point (i, j) of a grid over a patch; on an edge that of the first of its two patches, whose parameters may
+// run otherwise, so that triangles meet.
+Vec3 grid_point(const Shape& shape, int patch, int i, int j, int cells) {
+  const auto inside = [cells](int k) { return k > 0 && k < cells; };
+  if (inside(i) != inside(j)) {
+    const int edge = inside(j) ? (i > 0 ? 1 : 0) : (j > 0 ? 3 : 2), k = inside(j) ? j : i;
+    const EdgeLink& link = shape.links[patch][edge];
+    if (!link.collapsed && link.patch >= 0 && std::pair(link.patch, link.edge) < std::pair(patch, edge)) {
+      const int there = link.reversed ? cells - k : k, end = link.edge % 2 ? cells : 0;
+      patch = link.patch;
+      i = link.edge < 2 ? end : there;
+      j = link.edge < 2 ? there : end;
+    }
+  }
+  return evaluate0(shape.patches[patch], static_cast<double>(i) / cells, static_cast<double>(j) / cells);
+}
+
+// Binary STL of the body, its centre of mass at `place`. All patches share one number of cells per parameter,
+// so that edges meet.
+std::string stl(const Shape& shape, const Vec3& place, double error, size_t* count) {
   int cells = 2;
   for (const BezierPatch& patch : shape.patches) cells = std::max(cells, cells_for(patch, error));
   std::string body;
   std::uint32_t triangles = 0;
-  for (const BezierPatch& patch : shape.patches) {
-    const auto at = [&](int i, int j) {
-      return Vec3(evaluate0(patch, static_cast<double>(i) / cells, static_cast<double>(j) / cells) +
-                  shape.mass.center);
-    };
+  for (int patch = 0; patch < static_cast<int>(shape.patches.size()); ++patch) {
+    const auto at = [&](int i, int j) { return Vec3(grid_point(shape, patch, i, j, cells) + place); };
     for (int i = 0; i < cells; ++i)
       for (int j = 0; j < cells; ++j) {
         const Vec3 p[4] = {at(i, j), at(i + 1, j), at(i + 1, j + 1), at(i, j + 1)};
@@ -128,8 +144,14 @@ void export_shape(const Arguments& a) {
     std::printf("%s: %zu exact cells\n", a.output.c_str(), shape->patches.size());
     return;
   }
+  Vec3 place = shape->mass.center;
+  if (kSingle * place.norm() > kStepShare * share * shape->bounding_radius) {
+    std::printf("%s: far from the origin; the triangles lie about it, moved by %.17g %.17g %.17g\n",
+                a.file.c_str(), -place[0], -place[1], -place[2]);
+    place.setZero();
+  }
   size_t triangles = 0;
-  write_whole(a.output, stl(*shape, share * shape->bounding_radius, &triangles));
+  write_whole(a.output, stl(*shape, place, share * shape->bounding_radius, &triangles));
   std::printf("%s: %zu triangles\n", a.output.c_str(), triangles);
 }
 
@@ -161,7 +183,7 @@ void view(const Arguments& a) {
   } else {
     const std::string mesh = a.output + "." + std::to_string(getpid()) + ".stl", draft = mesh + ".png";
     size_t triangles = 0;
-    write_whole(mesh, stl(*shape, 1e-3 * shape->bounding_radius, &triangles));
+    write_whole(mesh, stl(*shape, Vec3::Zero(), 1e-3 * shape->bounding_radius, &triangles));
     const std::string command = "/usr/bin/python3 -W ignore " + quoted(find_script()) + " " + quoted(draft) +
                                 " " + quoted(mesh) + " >/dev/null 2>&1";
     const int status = std::system(command.c_str());

@@ -176,6 +176,81 @@ class Fit(unittest.TestCase):
         for radius in found[1:]:
             self.assertAlmostEqual(radius / found[0], 1, 5)
 
+    def test_far_from_the_origin(self):
+        """A body's place matters to no fit: its figures are those at the origin, and near it so is its place."""
+        far = np.array([1e5, -3e5, 2e5])
+        for name, (points, faces), kind in (("prism", meshes.prism(6, 1, 0.7), "polyhedron of 8 faces"),
+                                            ("cylinder", meshes.prism(32), "body of revolution"),
+                                            ("ball", meshes.icosphere(3), "sphere"), ("grain", meshes.grain(2, 3), "bi")):
+            points = np.round(meshes.turned(points, 5), 4)  # exact at all places, up to round-off
+            told = []
+            for place, file in ((0 * far, "near.obj"), (far, "far.obj"), (3 * far, "farther.ply")):
+                with self.subTest(name=name, file=file):
+                    text = meshes.ply(points + place, faces, "<") if "ply" in file else meshes.obj(points + place, faces)
+                    run = call("fit", self.mesh(text, file), "--tolerance", "5%", "-o", self.out)
+                    self.assertEqual(run.returncode, 0, run.stderr)
+                    self.assertIn("out.json: " + kind, run.stdout)
+                    self.assertEqual("radii from the origin" in run.stdout, "far" in file)
+                    told.append(re.search(r"\(bounds\)(.*)", run.stdout, re.S)[1].replace("-0.0", "+0.0"))
+                    moved = re.search(r"origin; moved to it, by (\S+) (\S+) (\S+),", run.stdout)
+                    self.assert_near(points + place + (np.array(moved.groups(), float) if moved else 0), 0.05)
+                    self.assertIn("proven: a sphere" if kind == "sphere" else "proven: ", call("check", self.out).stdout)
+            figures = [[float(x) for x in re.findall(r"(?:volume|off by|mass by|radius) (\S+)", one)] for one in told]
+            for others in figures[1:]:
+                np.testing.assert_allclose(others, figures[0], rtol=0.01, atol=1e-4)
+
+    def test_at_a_distance(self):
+        """A fit lies where its mesh does as long as that costs its joints nothing."""
+        points, faces = meshes.prism(64)
+        for shift, kept in ((20, True), (300, False)):
+            told = self.fit(points + (shift, 0, 0), faces)
+            self.assertEqual("radii from the origin" not in told, kept)
+            self.assert_near(points + (shift if kept else 0, 0, 0), 0.01)
+            self.assertGreater(float(re.search(r"; curvature radius (\S+) to inf", told)[1]), 0.02)
+
+    def test_single_precision_far_away(self):
+        """What is left of a prism's faces is plane to 1e-3 only: they are faces all the same."""
+        points, faces = meshes.prism(6, 1, 0.7)
+        told = self.fit(meshes.turned(points, 5) + (8e3, -5e3, 3e3), faces, "--tolerance", "2%")
+        self.assertIn("polyhedron of 8 faces", told)
+        self.assert_near(meshes.turned(points, 5), 0.021)
+
+    def test_far_bodies_by_other_ways(self):
+        """simplify, export and make take a shape or mesh from far away as from the origin."""
+        made = call("make", "superellipsoid", "--axes", "1,1,1.5", "--exponent", "2.5", "--spans", "8", self.place / "near.json")
+        self.assertEqual(made.returncode, 0, made.stderr)
+        content = json.loads((self.place / "near.json").read_text())
+        for s in content["shape"]["data"]:
+            s["control_points"]["points"] = (np.array(s["control_points"]["points"]) + (1e6, 1e6, -1e6)).tolist()
+        (self.place / "far.json").write_text(json.dumps(content))
+        near, far = (call("simplify", self.place / f, "--tolerance", "2%", "-o", self.out) for f in ("near.json", "far.json"))
+        self.assertEqual(far.returncode, 0, far.stderr)
+        self.assertEqual(*(re.search("against the body: volume (.{5})", run.stdout)[1] for run in (near, far)))
+        points, _ = sample(self.place / "near.json", 12)
+        self.assert_near(points, 0.02)
+        self.assertNotIn("gyration", json.loads(self.out.read_text()))
+        told = call("export", self.place / "far.json", "-o", self.place / "far.stl").stdout
+        self.assertIn("far from the origin", told)
+        triangles = np.frombuffer((self.place / "far.stl").read_bytes()[84:], dtype=[("n", "<f4", 12), ("a", "<u2")])["n"]
+        corners = triangles[:, 3:].reshape(-1, 3).astype(float)
+        own = meshes.volume(corners, np.arange(len(corners)).reshape(-1, 3))
+        whole = float(re.search(r"volume +(\S+)", call("info", self.place / "near.json").stdout)[1])
+        self.assertAlmostEqual(own / whole, 1, 2)
+        prism, faces = meshes.prism(6, 1, 0.7)
+        made = call("make", "rounded-polyhedron", "--mesh", self.mesh(meshes.obj(prism + 1e6, faces), "far.obj"),
+                    "--rounding", "0.1", self.out)
+        self.assertEqual(made.returncode, 0, made.stderr)
+        self.assertIn("82 patches", made.stdout)
+
+    def test_exported_triangles_close(self):
+        """Also where two patches run along their common edge by other parameters."""
+        for solid in ("cube", "tetrahedron"):
+            made = call("make", "rounded-polyhedron", "--solid", solid, "--rounding", "0.1", self.place / "solid.json")
+            self.assertEqual(made.returncode, 0, made.stderr)
+            self.assertEqual(call("export", self.place / "solid.json", "-o", self.place / "solid.stl").returncode, 0)
+            run = call("fit", self.place / "solid.stl", "--tolerance", "20%", "-o", self.out)
+            self.assertEqual(run.returncode, 0, run.stderr)
+
     def test_thin_plates(self):
         """Thinner than the tolerance would round their edges: as round as they can be."""
         points, faces = meshes.prism(4)
@@ -198,6 +273,14 @@ class Fit(unittest.TestCase):
             said = self.fit(points * axes, faces, "--tolerance", "3%")
             self.assert_near(points * axes, 0.03)
             self.assertLess(abs(float(re.search(r"against the mesh: volume ([-+]\S+) %", said)[1])), 6)
+
+    def test_thin_bodies_keep_their_volume(self):
+        """A body within the tolerance may be far too thick: a stricter one is taken where there is one."""
+        for (points, faces), axes in ((meshes.prism(6), (1, 1, 1000)), (meshes.prism(64), (1, 0.03, 0.001))):
+            told = self.fit(points * axes, faces, "--tolerance", "5%" if axes[2] > 1 else "1%")
+            self.assertIn("its volume is off", told)
+            self.assertLess(abs(float(re.search(r"against the mesh: volume ([-+]\S+) %", told)[1])), 10)
+            self.assert_near(points * axes, 0.05)
 
     def test_sharp_edges_keep_their_flat_faces(self):
         """Cylinders and cones become bodies of revolution, polyhedra keep their faces: edges rounded, few points."""
