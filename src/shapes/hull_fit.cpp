@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <limits>
 #include <map>
 #include <queue>
 
@@ -646,7 +647,7 @@ HullDistance hull_distance(const Shape& shape, const ConvexHull& hull, double re
 namespace {
 
 HullFit fit_near_one(const ConvexHull& hull, const HullFitOptions& options) {
-  HullFit fit = HullFitter(hull, options, kThin, 1e300).run();
+  HullFit fit = HullFitter(hull, options, kThin, std::numeric_limits<double>::infinity()).run();
   const MassProperties own = hull.properties();
   const auto error = [&](const HullFit& f) { return std::abs(f.shape->mass.volume / own.volume - 1); };
   const bool thin = principal_lengths(own)[0] < kThin * options.tolerance * fit.radius;
