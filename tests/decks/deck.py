@@ -60,13 +60,13 @@ class Run:
 
 @contextlib.contextmanager
 def cores(ranks):
-    """A core for one rank, all for several: they wait for each other at every step, and beside others ten times as long.
+    """A core a rank, or all: ranks wait for each other at every step, and beside others ten times as long.
     CORES, a directory of one file a core, is given by tests/run; without it nothing is shared."""
     with contextlib.ExitStack() as taken:
         files = [taken.enter_context(open(p)) for p in sorted(pathlib.Path(os.environ["CORES"]).iterdir())] \
             if "CORES" in os.environ else []
         if ranks > 1:
-            for file in files:
+            for file in files[:ranks]:  # always in this order: no two wait for each other
                 fcntl.flock(file, fcntl.LOCK_EX)
         elif files:
             take_one(files)
@@ -74,8 +74,8 @@ def cores(ranks):
 
 
 def take_one(files):
-    """Locks the first file that is free; all being taken, one that this process always waits for."""
-    for file in files:
+    """Locks the last file that is free; all being taken, one that this process always waits for."""
+    for file in reversed(files):
         with contextlib.suppress(BlockingIOError):
             return fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
     fcntl.flock(files[os.getpid() % len(files)], fcntl.LOCK_EX)
