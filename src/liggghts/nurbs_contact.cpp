@@ -139,7 +139,8 @@ void warn_deep_run(LAMMPS* lmp, const nurbs::DeepContacts& mine, const std::stri
   char words[256];
   std::snprintf(words, sizeof words,
                 "in the run contacts were as deep as %.3g %% of the bounding radius; beyond %g %% with flat "
-                "faces, %g %% without, they need not keep energy: are they too soft?",
+                "faces, %g %% without, they need not keep energy: are they too soft, or is "
+                "the time step too long?",
                 100 * all.deepest, 100 * nurbs::DeepContacts::kFlatInRun,
                 100 * nurbs::DeepContacts::kRoundInRun);
   warn(FLERR, lmp, user + ": " + words);
