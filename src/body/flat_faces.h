@@ -74,6 +74,10 @@ struct RuledLine {
 };
 bool ruled_line(const Shape& shape, const SurfacePoint& at, const Vec3& d, double angle, RuledLine* line);
 
+// A bound on the turn, rad, at most pi / 4, before d is square to one of these lines: only then can it hold
+// the support point along d, which is at `where` now.
+double turn_to_ruled_line(const Shape& shape, const SurfacePoint& where, const Vec3& d);
+
 // The support set of a body in unit direction d (shape frame, scale 1) widened by `tolerance` (length): the
 // face, else the crease, else the ruled line all of whose points have d . x >= h(d) - tolerance; else the
 // support point. A feature is taken whole or not at all: its points then belong to the body and not to d.

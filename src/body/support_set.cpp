@@ -11,10 +11,11 @@
 namespace nurbs {
 namespace {
 
-constexpr double kBesideJoint = 1e-7;  // a parameter this near 0 or 1 may belong to the neighbour
-constexpr double kStraightOn = 1e-8;   // rad, between the pieces of a line, and of their normals
-constexpr int kMostPieces = 16;        // patches that a line may cross to each side
-constexpr double kFaceCosine = 0.5;    // a face further away than 60 degrees is not asked
+constexpr double kBesideJoint = 1e-7;    // a parameter this near 0 or 1 may belong to the neighbour
+constexpr double kStraightOn = 1e-8;     // rad, between the pieces of a line, and of their normals
+constexpr int kMostPieces = 16;          // patches that a line may cross to each side
+constexpr double kLineAngle = M_PI / 4;  // nor is a line whose normal is further away
+constexpr double kFaceCosine = 0.5;      // a face further away than 60 degrees is not asked
 
 // Edge of a patch that ends its rulings, low or high.
 int end_edge(Ruling ruling, bool high) {
@@ -78,16 +79,13 @@ bool ends_ruling(const Shape& shape, const EdgeLink& link) {
          (link.edge == end_edge(ruling, false) || link.edge == end_edge(ruling, true));
 }
 
-}  // namespace
-
-bool ruled_line(const Shape& shape, const SurfacePoint& at, const Vec3& d, double angle, RuledLine* line) {
-  if (shape.flats.ruling.empty()) return false;
-  double best = -std::numeric_limits<double>::infinity();
+// Calls visit(line) for the ruled lines through a surface point and beside it.
+template <class Visit>
+void each_line(const Shape& shape, const SurfacePoint& at, const Vec3& d, double angle, Visit visit) {
+  if (shape.flats.ruling.empty()) return;
   const auto try_at = [&](const SurfacePoint& place) {
-    RuledLine other;
-    if (!line_through(shape, place, d, angle, &other)) return;
-    const double lowest = std::min(d.dot(other.ends[0]), d.dot(other.ends[1]));
-    if (lowest > best) best = lowest, *line = other;
+    RuledLine line;
+    if (line_through(shape, place, d, angle, &line)) visit(line);
   };
   try_at(at);
   for (int edge = 0; edge < 4; ++edge) {
@@ -99,7 +97,26 @@ bool ruled_line(const Shape& shape, const SurfacePoint& at, const Vec3& d, doubl
     (edge < 2 ? on_edge.u : on_edge.v) = edge % 2;
     try_at(across(shape.patches, link, on_edge, edge));
   }
+}
+
+}  // namespace
+
+bool ruled_line(const Shape& shape, const SurfacePoint& at, const Vec3& d, double angle, RuledLine* line) {
+  double best = -std::numeric_limits<double>::infinity();
+  each_line(shape, at, d, angle, [&](const RuledLine& other) {
+    const double lowest = std::min(d.dot(other.ends[0]), d.dot(other.ends[1]));
+    if (lowest > best) best = lowest, *line = other;
+  });
   return best > -std::numeric_limits<double>::infinity();
+}
+
+double turn_to_ruled_line(const Shape& shape, const SurfacePoint& where, const Vec3& d) {
+  double least = kLineAngle;
+  each_line(shape, where, d, kLineAngle, [&](const RuledLine& line) {
+    const Vec3 way = line.ends[1] - line.ends[0];
+    least = std::min(least, std::abs(d.dot(way)) / way.norm());  // the sine, below the angle
+  });
+  return least;
 }
 
 SupportSet support_set(const Shape& shape, const Vec3& d, double tolerance) {
@@ -132,7 +149,8 @@ SupportSet support_set(const Shape& shape, const Vec3& d, double tolerance) {
   }
   if (set.count > 0) return set;
   RuledLine line;
-  if (ruled_line(shape, support.where, d, M_PI / 4, &line) && inside(line.ends[0]) && inside(line.ends[1])) {
+  if (ruled_line(shape, support.where, d, kLineAngle, &line) && inside(line.ends[0]) &&
+      inside(line.ends[1])) {
     set_point(set, 0, line.ends[0], -1);
     set_point(set, 1, line.ends[1], -1);
     set.count = 2;
@@ -157,7 +175,7 @@ double feature_lag(const Shape& shape, const Vec3& d, double h, const SurfacePoi
     highest =
         std::max(highest, std::min(d.dot(flats.vertices[edge.ends[0]]), d.dot(flats.vertices[edge.ends[1]])));
   RuledLine line;
-  if (ruled_line(shape, where, d, M_PI / 4, &line))
+  if (ruled_line(shape, where, d, kLineAngle, &line))
     highest = std::max(highest, std::min(d.dot(line.ends[0]), d.dot(line.ends[1])));
   return h - highest;
 }

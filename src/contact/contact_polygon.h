@@ -62,6 +62,7 @@ constexpr double kReferenceShare = 0.05;  // of the overlap by which the other f
 constexpr double kOutgrownShare = 0.1;    // of the overlap by which the body may be deeper than its points
 constexpr double kClearTurn = 0.2;   // of the smaller bounding radius: what a contact's normal that turns
                                      // by 1 rad takes off its clear way
+constexpr double kClearGrowth = 2;   // what an overlap of two bodies that changes by 1 takes off it
 constexpr double kClipSlack = 1e-9;  // of the larger bounding radius: places that count as equal
 
 struct ContactPolygon {
@@ -98,7 +99,8 @@ BodyFrame plane_frame(const Vec3& origin);
 //
 // `clear`, of this and the others, is set where the answer is no: how far the bodies' points may go, paths of
 // both together, before it can be another one; 0 where that is not known. It holds for contacts whose overlap
-// grows by no more than they go; of the normal's turns kClearTurn is to be taken off.
+// grows by no more than they go; of the normal's turns kClearTurn is to be taken off. Of two bodies it
+// is how far B's points may go as seen from A, and of the overlap's changes kClearGrowth is to be taken off.
 bool make_plane_polygon(const Particle& particle, const Vec3& origin, const Vec3& normal, double reach,
                         ContactPolygon* out, double* clear = nullptr);
 

@@ -11,8 +11,18 @@ using namespace polygon;
 constexpr double kFaceCosine = 0.5;  // a face further than 60 degrees from the contact's normal is not asked
 constexpr double kOtherFaceCosine = 0.3;  // nor may one further than 72 degrees soon be
 constexpr double kLineAngle = 0.8;        // rad, the same for the normal of a ruled line
+constexpr double kPairShare = 0.5;        // as kWayShare, where the overlap's growth counts by itself
 constexpr double kMostAcross = 0.1;       // rad: one step of the search for the least overlap across lines
 constexpr int kAcrossSteps = 12;          // of them; 2 to 3 are usual
+
+// How far a pair may go before `d`, which a body's support point is along, may come square to a ruled line:
+// before that no such line supports the body. Relative turns are ways, at the smaller radius at least; of
+// those of the normal each takes kClearTurn of it.
+double turn_room(const Body& body, const SurfacePoint& where, const Vec3& d, double smaller) {
+  constexpr double kMostTurn = 0.3;
+  const double turn = std::min(kMostTurn, turn_to_ruled_line(*body.shape, where, d));
+  return turn * smaller / (kPairShare * (1 + 1 / kClearTurn));
+}
 
 // One attempt at a pair's polygon with a given face as the reference.
 class FaceContact {
@@ -37,8 +47,9 @@ class FaceContact {
   // How far all points of both bodies may go while something of whatever may lie over the reference face is
   // sure to be higher than `most`, so that make() fails; 0 where that is not seen.
   double room(double most) {
-    double least = face_room(opposite(), most);
-    if (!(least > 0)) return 0;
+    const Opposite o = opposite();
+    double least = face_room(o, most);
+    if (least == 0) least = shared_room(o, most);
     for (const StraightEdge& edge : incident_.shape->flats.edges) {
       if (!(least > 0)) return 0;
       least = std::min(least,
@@ -46,8 +57,13 @@ class FaceContact {
     }
     if (!(least > 0)) return 0;
     RuledLine line;
-    Vec3 support;
-    return incident_line(&line, &support) ? std::min(least, segment_room(line.ends, most)) : least;
+    Support support;
+    if (!incident_line(&line, &support)) return least;
+    double of_line = segment_room(line.ends, most);
+    if (of_line == 0 && !is_on_line(*incident_.shape, support.point, line.ends[0], line.ends[1]))
+      of_line =
+          turn_room(incident_, support.where, down(), std::min(reference_.radius(), incident_.radius()));
+    return std::min(least, of_line);
   }
 
   // `swallowed`: the reference face lies inside the incident one.
@@ -132,12 +148,35 @@ class FaceContact {
     double best =
         (middle - other).norm() - reference_.frame.scale * face_.radius - incident_.frame.scale * face.radius;
     if (best > 0) return best;
-    for (const double t : {0.0, 0.5, 1.0}) {
-      const Vec2 at = middle + t * (other - middle);
-      const double over = height(o, at), high = over - most;
-      if (high > best) best = std::max(best, std::min({high, inside_reference(at), inside(o, at, over)}));
-    }
-    return std::max(best, 0.0);
+    best = 0;
+    for (const double t : {0.0, 0.5, 1.0})
+      best = std::max(best, room_at(o, middle + t * (other - middle), most, best));
+    return best;
+  }
+  // How far inside both outlines, and above `most`, a place is; `best` where it can't be more.
+  double room_at(const Opposite& o, const Vec2& at, double most, double best) const {
+    const double over = height(o, at), high = over - most;
+    return high > best ? std::min({high, inside_reference(at), inside(o, at, over)}) : best;
+  }
+  // The same from the part that the outlines share: on the way from its highest corner to its middle.
+  double shared_room(const Opposite& o, double most) const {
+    const ConvexPolygon cut = shared(o);
+    if (cut.count < 3) return 0;
+    int highest = 0;
+    for (int i = 1; i < cut.count; ++i)
+      if (height(o, cut.corner[i]) > height(o, cut.corner[highest])) highest = i;
+    const Vec2 from = cut.corner[highest], to = polygon_centroid(cut);
+    double best = 0;
+    for (const double t : {0.1, 0.3, 0.6})
+      best = std::max(best, room_at(o, from + t * (to - from), most, best));
+    return best;
+  }
+  ConvexPolygon shared(const Opposite& o) const {
+    const FlatFace& face = incident_.shape->flats.faces[o.face];
+    ConvexPolygon outline;
+    for (int i = 0; i < static_cast<int>(face.outline.size()); ++i)
+      outline.add(plane_.project(incident_.place(incident_.vertex(vertex(face, i)))));
+    return intersect(outline, window(), slack_);
   }
   double segment_room(const Vec3 (&ends)[2], double most) const {
     const Vec3 p = incident_.place(ends[0]), q = incident_.place(ends[1]);
@@ -158,10 +197,7 @@ class FaceContact {
     const Opposite o = opposite();
     if (o.face < 0 || face_room(o, most) > 0) return false;
     const FlatFace& face = incident_.shape->flats.faces[o.face];
-    ConvexPolygon outline;
-    for (int i = 0; i < static_cast<int>(face.outline.size()); ++i)
-      outline.add(plane_.project(incident_.place(incident_.vertex(vertex(face, i)))));
-    const ConvexPolygon cut = intersect(outline, window(), slack_);
+    const ConvexPolygon cut = shared(o);
     if (cut.count < 3) return false;
     points_.plane.count = 0;
     whole_ = true;
@@ -241,19 +277,18 @@ class FaceContact {
   }
 
   // The incident body's ruled line that is deepest, and its support point.
-  bool incident_line(RuledLine* line, Vec3* support) const {
+  bool incident_line(RuledLine* line, Support* support) const {
     const Shape& shape = *incident_.shape;
     if (shape.flats.ruling.empty()) return false;
-    const Support s = find_hull_support(shape, down());
-    *support = s.point;
-    return ruled_line(shape, s.where, down(), kLineAngle, line);
+    *support = find_hull_support(shape, down());
+    return ruled_line(shape, support->where, down(), kLineAngle, line);
   }
 
   bool line_points(double most) {
     RuledLine line;
-    Vec3 support;
+    Support support;
     if (!incident_line(&line, &support) ||
-        !is_on_line(*incident_.shape, support, line.ends[0], line.ends[1]) ||
+        !is_on_line(*incident_.shape, support.point, line.ends[0], line.ends[1]) ||
         !segment(line.ends, {-1, -1}, most, &points_, &whole_))
       return false;
     ruled_ = true;
@@ -285,11 +320,16 @@ struct Line {
   bool ruled;
 };
 
-// A crease or ruled line that supports the body in lab direction d, to `tolerance`.
-bool support_line(const Body& body, const Vec3& d, double tolerance, Line* line) {
-  const SupportSet set = support_set(*body.shape, body.turned_back(d), tolerance / body.frame.scale);
-  if (set.count != 2 || (set.ruled && !is_on_line(*body.shape, set.support, set.point[0], set.point[1])))
+// A crease or ruled line that supports the body in lab direction d, to `tolerance`. `room`, where there is
+// none: how far the pair may go before there may be.
+bool support_line(const Body& body, const Vec3& d, double tolerance, double smaller, Line* line,
+                  double* room) {
+  const Vec3 on_body = body.turned_back(d);
+  const SupportSet set = support_set(*body.shape, on_body, tolerance / body.frame.scale);
+  if (set.count != 2 || (set.ruled && !is_on_line(*body.shape, set.support, set.point[0], set.point[1]))) {
+    *room = body.shape->flats.edges.empty() ? turn_room(body, set.where, on_body, smaller) : 0;
     return false;
+  }
   for (int i = 0; i < 2; ++i) {
     line->ends[i] = body.place(set.point[i]);
     line->vertex[i] = set.vertex[i];
@@ -368,13 +408,14 @@ bool line_contact(const Body& a, const Body& b, Vec3 d, double overlap, double r
   *room = lag(b, -d, starts ? &starts[1] : nullptr) - reach;
   if (*room > 0) return false;
   *room = 0;
+  const double smaller = std::min(a.radius(), b.radius());
   Line on_a, on_b;
-  if (!support_line(a, d, reach, &on_a)) return false;
+  if (!support_line(a, d, reach, smaller, &on_a, room)) return false;
   if (rolls) {
     d = least_across(a, b, (on_a.ends[1] - on_a.ends[0]).normalized(), d);
-    if (!support_line(a, d, reach, &on_a)) return false;
+    if (!support_line(a, d, reach, smaller, &on_a, room)) return false;
   }
-  if (!support_line(b, -d, reach, &on_b)) return false;
+  if (!support_line(b, -d, reach, smaller, &on_b, room)) return false;
   const LinePair lines = pair_of(on_a, on_b, d);
   const ReferencePlane& plane = lines.plane;
   const double length = lines.length;
@@ -461,7 +502,7 @@ bool make_pair_polygon(const Particle& pa, const Particle& pb, const Vec3& norma
     }
   }
   const double smaller = std::min(a.radius(), b.radius()), larger = std::max(a.radius(), b.radius());
-  *clear = kWayShare * std::min(room, kMostRoom * smaller) * smaller / larger;
+  *clear = kPairShare * std::min(room, kMostRoom * smaller) * smaller / larger;
   return false;
 }
 

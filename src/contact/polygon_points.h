@@ -9,6 +9,7 @@
 #include "body/flat_faces.h"
 #include "body/support.h"
 #include "contact/contact_polygon.h"
+#include "contact/proof.h"
 
 namespace nurbs::polygon {
 
@@ -17,13 +18,6 @@ constexpr double kInfinite = std::numeric_limits<double>::infinity();
 // Share of the room to a polygon, at most kMostRoom smaller bounding radii, that bodies may go: reach and
 // overlap grow by up to five times the way, heights on inclined faces change by more than it.
 constexpr double kWayShare = 0.1, kMostRoom = 0.3;
-
-inline void store(const Vec3& v, double* out) {
-  for (int k = 0; k < 3; ++k) out[k] = v[k];
-}
-inline Vec3 load(const double* v) {
-  return {v[0], v[1], v[2]};
-}
 
 // Names of a polygon's points; 0: none.
 std::uint32_t vertex_id(int body, int vertex);

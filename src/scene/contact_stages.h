@@ -306,6 +306,7 @@ class ContactStages {
 
   // Flat faces, creases and ruled lines: flat_stage.cpp.
   bool may_be_flat(int a, int b) const;
+  double clear_way(int a, int b, double* until) const;
   Vec3 wall_frame(int a) const;
   bool find_polygon(int a, int b, const Vec3& normal, double overlap, double reach, const ContactPolygon* old,
                     ContactPolygon* polygon, double* clear = nullptr,

@@ -61,6 +61,17 @@ Vec3 ContactStages::wall_frame(int a) const {
   return a < 0 ? load(record(a).x) : Vec3(Vec3::Zero());
 }
 
+// What a contact's `until` is compared with: the bodies' paths. Of a pair, which may be on its way together,
+// it is nothing, and `until` is how far B may still go as seen from A: less what the last step took.
+double ContactStages::clear_way(int a, int b, double* until) const {
+  if (a < 0) return path(a, b);
+  const BodyRecord &ra = record(a), &rb = record(b);
+  const Vec3 spin_a = load(ra.spin), spin_b = load(rb.spin);
+  const Vec3 velocity = load(rb.velocity) - load(ra.velocity) - spin_a.cross(offset(a, b));
+  *until -= step_.dt * (velocity.norm() + rb.radius * (spin_b - spin_a).norm());
+  return 0;
+}
+
 // Energy that left the springs.
 void ContactStages::book(double energy, int a, int b) {
   if (step_.ledger) dissipated_.damping += share(a, b) * energy;
@@ -113,12 +124,13 @@ bool ContactStages::make_flat(ContactBlock& block, int lane, const Results& sing
   const Vec3 normal = single.normal_of(lane);
   double before[3];
   block.get(lane, kStateField + 3, 3, before);
-  const double way = path(a, b);
+  const double overlap = -single.gap[lane], last_overlap = block.field[kStateField + 2][lane];
+  const double way = clear_way(a, b, &block.until[lane]);
   block.until[lane] -= kClearTurn * smaller_radius(a, b) * (normal - load(before)).norm();
+  if (a >= 0) block.until[lane] -= kClearGrowth * std::abs(overlap - last_overlap);
   // A region's plane may be another one than the last step's.
   if (a >= -1 && way < block.until[lane] && normal.dot(load(before)) > kSameNormal) return false;
   block.until[lane] = 0;
-  const double overlap = -single.gap[lane];
   ContactPolygon polygon;
   double clear = 0;
   PointMemory on[2];
@@ -174,8 +186,8 @@ bool ContactStages::serve_flat(ContactBlock& block, int lane, LeftPolygon* left)
   FlatContact& flat = *pool_.flat_of(block, lane);
   PolygonState state = now(flat.polygon, *step_.bodies, wall_frame(a), a, b);
   const PolygonVerdict verdict = judge(flat.polygon, state);
-  const double way = path(a, b);
   double& until = flat.points.until[0];
+  const double way = clear_way(a, b, &until);
   if (!step_.setup && verdict != PolygonVerdict::keep &&
       !(verdict == PolygonVerdict::tilted && way < until)) {
     const Particle body = step_.bodies->particle(b);

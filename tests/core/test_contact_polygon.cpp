@@ -565,11 +565,12 @@ TEST(PairPolygon, where_there_is_none_there_is_none_on_the_clear_way) {
     for (int k = 0; k < 8 && clear > 0; ++k) {
       a = a0;
       b = b0;
-      const double share = random.uniform(0, 1);
-      move(random, 0.999 * share * clear, &a);
-      move(random, 0.999 * (1 - share) * clear, &b);
+      const double share = random.uniform(0, 1), way = random.uniform(0.3, 0.999) * clear;
+      move(random, share * way, &a);
+      move(random, (1 - share) * way, &b);
       const ContactResult now = contact();
       if (!(now.gap < 0) || now.normal.dot(r.normal) < 0.99) continue;
+      if (way + kClearGrowth * std::abs(r.gap - now.gap) > clear) continue;
       ++asked;
       facing += face_to_face;
       EXPECT_FALSE(make_pair_polygon(a, b, now.normal, -now.gap, -kReach * now.gap, nullptr, &polygon))
