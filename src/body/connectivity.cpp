@@ -81,6 +81,9 @@ double refine_closest(const BezierPatch& patch, int edge, const Vec3& x, double 
   return t;
 }
 
+constexpr double kNoGap = 1e-6;        // of the tolerance: sides so near have the same parameters
+constexpr double kNotByChance = 1e-2;  // share of a gap that better parameters leave
+
 double same_parameter_gap(const Edge& a, const Edge& b, bool reversed) {
   double gap = 0;
   for (int k = 0; k < kEdgeSamples; ++k) {
@@ -169,12 +172,13 @@ void add_candidates(const std::vector<BezierPatch>& patches, const std::vector<E
       return bound_joint_gap(patches[a.patch], a.edge, patches[b.patch], link_of(k, b));
     };
     c.gap = gap(c);
-    if (c.gap > kSameParameters * tolerance) {  // more than rounded digits: other parameters may fit better
+    if (c.gap > kNoGap * tolerance) {  // other parameters may fit better, among rounded digits by chance
+      const double share = c.gap > kSameParameters * tolerance ? 0.5 : kNotByChance;
       for (const double ratio : {ratio_of_weights(patches, a, b, reversed), ratio_between(patches, a, b)}) {
         Candidate other = c;
         other.ratio = ratio;
         other.gap = gap(other);
-        if (other.gap < 0.5 * c.gap) c = other;
+        if (other.gap < share * c.gap) c = other;
       }
     }
     const bool closed = (a.at.front() - a.at.back()).norm() <= tolerance;

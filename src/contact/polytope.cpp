@@ -52,6 +52,7 @@ struct Bend {
 };
 
 constexpr int kBeforeRings = 64;          // queries before rings of directions are looked for
+constexpr int kBentBeforeRings = 192;     // ... of bodies without sharp edges, which caps may do for
 constexpr int kAtPoles = 256;             // ... and where the least overlap is along an axis
 constexpr double kPolar = 0.1;            // sine of the angle from it
 constexpr int kMostIdle = 30;             // queries in a row that leave the bracket as it is
@@ -61,6 +62,16 @@ constexpr double kCapDepth = 0.4;         // of the tolerance, that a cap proves
 constexpr double kCapUsed = 0.8;          // of a cap's angle: the rest is for lower minima found later
 constexpr double kWidestCap = 0.42, kLeastCap = 1e-4, kNextCap = 0.75;  // rad
 constexpr double kOffNormal = 1e-6;  // rad: a support's normal further from its direction is no W of it
+// A cap whose bodies are cut to their cores about it, below.
+constexpr double kOffSupport = 1e-4;  // rad
+constexpr int kBeforeCores = 96;      // points before that is tried ...
+constexpr int kBetweenCores = 96;     // ... and again
+constexpr double kSameBasin = 0.97;   // cosine
+constexpr double kCoreDepth = 0.98;   // of the overlap
+constexpr int kCorePoints = 320;      // spent on one
+constexpr int kRim = 8;               // points that give away what is outside
+constexpr double kWorthCores = 0.6;   // of the points that the minimum would cost without
+constexpr std::array<double, 8> kCoreCaps = {0.4, 0.25, 0.16, 0.11, 0.075, 0.048, 0.03, 0.015};  // rad
 
 // Everything the search over directions keeps.
 class Search {
@@ -72,6 +83,59 @@ class Search {
     shrink_b_ = pair.scale_b * std::min(pair.b->curvature.min_radius, pair.b->inner_radius);
     (shrink_a_ < shrink_b_ ? shrink_a_ : shrink_b_) *= kCoreShare;
     shrink_ = shrink_a_ + shrink_b_;
+  }
+
+  // About the minimum at point `from` of another search, with cores that are those of the bodies for
+  // directions within `valid` of it.
+  Search(const Search& whole, int from, double valid, double shrink_a, double shrink_b)
+      : pair_(whole.pair_),
+        tolerance_(whole.tolerance_),
+        joggle_(0),
+        shrink_a_(shrink_a),
+        shrink_b_(shrink_b),
+        shrink_(shrink_a + shrink_b),
+        valid_(valid),
+        middle_(whole.witness_[from].d),
+        hull_(kSliver * whole.pair_.reach) {
+    query(middle_, -1);
+    witness_[0].on_a = whole.witness_[from].on_a;
+    witness_[0].on_b = whole.witness_[from].on_b;
+  }
+
+  // The angle about the middle within which every direction is proven to have an overlap (of the cores) of
+  // `level`, or 0; lowers that where it finds less. Directions d' with d' . G >= level for one of the points
+  // G of the rim are given away; those are none within the angle, and all that are not within `valid`.
+  double prove(double* level) {
+    // A support that lacks a share of the tolerance belongs to a direction that is a little off.
+    const double valid = valid_ - kOffSupport, angle = std::cos(M_PI / kRim) * valid * (1 - kOffNormal),
+                 inner = 0.5 * angle, far = *level / std::sin(angle - inner), least = 0.9 * *level;
+    const Vec3 t = middle_.unitOrthogonal(), s = middle_.cross(t);
+    const auto give_away = [&](const Vec3& g) {
+      witness_[hull_.points()] = witness_[0];
+      witness_[hull_.points()].cap = true;
+      hull_.store(g);
+    };
+    for (int k = 0; k < kRim; ++k) {
+      const double azimuth = 2 * M_PI * k / kRim;
+      give_away(far * (std::cos(inner) * (std::cos(azimuth) * t + std::sin(azimuth) * s) -
+                       std::sin(inner) * middle_));
+    }
+    give_away(-2 * *level * middle_);
+    Vec3 across;
+    if (!start_from_points(0, &across)) return 0;
+    surround(0, 0);
+    const double narrow = std::cos(valid);
+    while (hull_.points() < kCorePoints) {
+      *level = std::min(*level, -lower_ - kCapDepth * tolerance_ - shrink_);
+      if (!(*level > least)) return 0;
+      const int near = best_face();
+      if (near < 0) return 0;
+      if (near_ >= *level + roundoff()) return inner + std::asin(*level / far) * (1 - kOffNormal);
+      if (!(direction_to_ask_.dot(middle_) > narrow)) return 0;
+      const int v = query(direction_to_ask_, closest_of(hull_.face(near), direction_to_ask_));
+      if (v < 0 || hull_.grow(v, least_height(), near) != GrowingHull::Growth::grown) return 0;
+    }
+    return 0;
   }
 
   // Builds the first solid: along the seed and three directions that make a tetrahedron with it; while those
@@ -118,9 +182,20 @@ class Search {
         stalled_ = true;
         return;
       }
+      if (hull_.points() >= before_cores_) {
+        before_cores_ = hull_.points() + kBetweenCores;
+        cover_by_cores();
+      }
       const bool low = witness_[v].p + lower_ <= kPolishAbove * std::abs(lower_);
       if (!(low && settle(v)) && balances_ < kMostBalances) balance(corners, v);
     }
+  }
+
+  // Leaves minima alone: where a support's points lie close together (a small body on a crease), rings of
+  // more of them break the hull.
+  void let_be() {
+    minima_ = kMostMinima;
+    balances_ = kMostBalances;
   }
 
   // Whether round-off ended the search, so that other directions may do better.
@@ -284,14 +359,76 @@ class Search {
       angle = to;
       break;
     }
-    if (!(angle > 0)) return 0;
+    return angle > 0 ? add_cap(v, level, angle, slope) : 0;
+  }
+
+  double add_cap(int v, double level, double angle, double slope) {
+    const Vec3 d = witness_[v].d;
     Cap cap{d, level, std::cos(angle), std::cos(kCapUsed * angle), slope, hull_.points(), v};
     hull_.store(level / cap.used * d);
-    witness_[cap.vertex] = w;
+    witness_[cap.vertex] = witness_[v];
     witness_[cap.vertex].cap = true;
     cap_[caps_++] = cap;
     if (hull_.faces() > 0) hull_.grow(cap.vertex, least_height());
     return kCapUsed * angle;
+  }
+
+  // The same by a hull of its own, of what the bodies are without balls that roll inside as far as the
+  // directions about the minimum can tell: those may be much larger than any that rolls all through them, and
+  // a hull needs the fewer points the less bent the cores are.
+  void cover_by_cores() {
+    while (caps_ < kMostMinima && hull_.points() < kHullVertices) {
+      const int near = best_face();
+      if (near < 0 || upper_ - lower_ <= tolerance_) return;
+      int v = -1;
+      for (int k = 0; k < hull_.points(); ++k)
+        if (!witness_[k].cap && witness_[k].d.dot(direction_to_ask_) > kSameBasin &&
+            (v < 0 || witness_[k].p < witness_[v].p))
+          v = k;
+      if (v < 0 || !(witness_[v].p + lower_ <= kSurroundAbove * std::abs(lower_)) || !cover_by_cores(v))
+        return;
+    }
+  }
+
+  // About point v; false where it does not succeed, or has not before.
+  bool cover_by_cores(int v) {
+    if (joggle_ > 0 || tries_ == kMostMinima) return false;
+    if (std::find(tried_, tried_ + tries_, v) != tried_ + tries_) return false;
+    tried_[tries_++] = v;
+    const Witness w = witness_[v];
+    const Vec3 d = w.d, t = d.unitOrthogonal(), s = d.cross(t), g = hull_.point(v);
+    const Mat3 back = pair_.turn.transpose();
+    const Bend a = bend_of(*pair_.a, w.on_a, pair_.scale_a, d, t, s),
+               b = bend_of(*pair_.b, w.on_b, pair_.scale_b, -(back * d), back * t, back * s);
+    const double level = -lower_ - kCapDepth * tolerance_ - shrink_;
+    Mat2 turn;
+    Extremes seen{level, 4 * level};  // a guess, where there is a crease
+    if (core_turn(v, d, t, s, &turn)) seen = extremes(turn);
+    // What a hull needs, but for a factor, from an angle on to `ratio` times that.
+    const auto points = [&](double cut, double ratio) {
+      return std::sqrt(std::max(0.0, seen.least - cut) * (seen.most - cut)) * std::log(ratio);
+    };
+    const double finest = std::sqrt(tolerance_ / seen.most);
+    double fewest = kWorthCores * points(0, kWidestRing / finest), valid = 0, cut_a = 0, cut_b = 0;
+    for (const double to : kCoreCaps) {
+      const double ra = least_radius(a, to), rb = least_radius(b, to), cut = ra + rb - shrink_;
+      if (!(cut > 0 && to > finest)) continue;
+      const double count = points(cut, to / finest) + points(0, kWidestRing / to);
+      if (count < fewest) fewest = count, valid = to, cut_a = ra, cut_b = rb;
+    }
+    const double share = std::min(1.0, kCoreDepth * (level + shrink_) / (cut_a + cut_b));
+    const double cut = share * (cut_a + cut_b) - shrink_;
+    double there = level - cut;
+    if (!(valid > 0 && level > tolerance_ && there > tolerance_)) return false;
+    Search cores(*this, v, valid, share * cut_a, share * cut_b);
+    const double angle = cores.prove(&there);
+    queries_ += cores.queries_;
+    if (angle > 0) add_cap(v, there + cut, angle, (g - d.dot(g) * d).norm() + kRoundoff * pair_.reach);
+    if (cores.lower_ > lower_) {  // a lower minimum
+      const int lower = query(cores.direction_, v);
+      if (lower >= 0) hull_.grow(lower, least_height());
+    }
+    return angle > 0;
   }
 
   // Of a body in its own axes, lengths of the lab.
@@ -336,6 +473,13 @@ class Search {
     bend.reach = local.room / (bend.most + std::sqrt(bend.most * bend.most + 2 * bend.rate * local.room)) *
                  2 * (1 - kOffNormal);
     return bend;
+  }
+
+  // W is no less for directions within `to` of d.
+  static double least_radius(const Bend& bend, double to) {
+    double rate = 0;
+    const Mat2 turn = least_turn(bend, to, &rate);
+    return std::max(0.0, extremes(turn).least - rate * to);
   }
 
   // A lower bound of W at d, less `rate` times the angle, for directions within `to` of it.
@@ -467,7 +611,7 @@ class Search {
       for (int k = 0; k < 4; ++k) {
         const double x = r * std::cos(phase + 0.5 * M_PI * k) / std::sqrt(most),
                      y = r * std::sin(phase + 0.5 * M_PI * k) / std::sqrt(least);
-        if (std::hypot(x, y) > kWidestTilted) continue;
+        if (std::hypot(x, y) > std::min(kWidestTilted, 0.9 * valid_)) continue;
         const int v = query((d + x * long_axis + y * short_axis).normalized(), from);
         if (v < 0) return;
         hull_.grow(v, least_height());
@@ -560,13 +704,17 @@ class Search {
   const PairFrame& pair_;
   double tolerance_, joggle_;
   double shrink_a_, shrink_b_, shrink_;
+  double valid_ = M_PI;  // what the cores hold for: directions within it of the middle
+  Vec3 middle_ = Vec3::Zero();
   double lower_ = -kFarAway, upper_ = kFarAway, near_ = -kFarAway;
   Vec3 direction_ = Vec3::UnitX(), direction_to_ask_ = Vec3::UnitX();
   int best_ = 0, queries_ = 0, balances_ = 0, minima_ = 0;
   bool stalled_ = false, lower_caps_ = false;
   int caps_ = 0;
   Cap cap_[kMostMinima];
-  Vec3 minimum_[kMostMinima];  // directions surrounded
+  Vec3 minimum_[kMostMinima];           // directions surrounded
+  int tried_[kMostMinima], tries_ = 0;  // points about which caps were tried by cores
+  int before_cores_ = kBeforeCores;
   Witness witness_[kHullVertices];
   GrowingHull hull_;
 };
@@ -590,9 +738,11 @@ PolytopeResult solve_polytope(const PairFrame& pair, const Vec3& seed, double to
   for (int attempt = 0; attempt < kHullAttempts; ++attempt) {
     const double joggle = attempt > 0 ? std::min(kJoggle * pair.reach, 0.05 * tolerance) : 0.0;
     Search search(pair, tolerance, joggle);
+    if (attempt % 2 == 1) search.let_be();
     const bool started = search.start(from);
     if (started && attempt == 0 && (pair.a->revolution.found || pair.b->revolution.found)) {
-      search.run(enough, kBeforeRings);
+      const bool bent = !pair.a->inner_map().nodes.empty() && !pair.b->inner_map().nodes.empty();
+      search.run(enough, bent ? kBentBeforeRings : kBeforeRings);
       best = search.result();
       if (!best.converged && is_polar(pair, best.bracket.direction)) {
         search.run(enough, kAtPoles);

@@ -21,8 +21,11 @@ struct PolytopeResult {
 // once inside, the normal of the nearest face, as in EPA, and its distance bounds the overlap below. Every
 // support gives the opposite bound p(d). Source: Gilbert, Johnson & Keerthi 1988; van den Bergen 2003, ch. 4,
 // here on one growing hull for both phases, on exact surfaces and with rigorous bounds. `seed`: a direction
-// worth trying first, or zero. Stops within `tolerance` (a length), when the gap is proven larger than
-// `enough`, or at its caps. Works in fixed-size storage.
+// worth trying first, or zero. Minima that want many points are surrounded by caps, which are proven by
+// second order, or by a hull of their own: within an angle of a minimum the inner maps know larger balls than
+// roll all through the bodies, and p(d) - r is the overlap of what is left without those, which bends less.
+// Stops within `tolerance` (a length), when the gap is proven larger than `enough`, or at its caps. Works in
+// fixed-size storage.
 PolytopeResult solve_polytope(const PairFrame& pair, const Vec3& seed, double tolerance, double enough);
 
 }  // namespace nurbs

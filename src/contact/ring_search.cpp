@@ -7,8 +7,11 @@
 namespace nurbs {
 namespace {
 
-constexpr int kMostCircles = 96;        // supports evaluated
-constexpr int kMostSectors = 700;       // bounded, some 0.3 us each
+constexpr int kMostCircles = 256;       // supports evaluated, one as dear as ...
+constexpr int kCircleCost = 4;          // ... sectors
+constexpr int kMostSpent = 2400;        // sectors bounded, some 0.3 us each, and circles
+constexpr int kFirstSpent = 900;        // ... and those after which it ends ...
+constexpr double kHopeless = 0.1;       // ... where less than this times its share of all is closed
 constexpr int kDeepestSector = 60;      // halvings of the azimuth
 constexpr double kNearAxis = 0.2;       // sine between the axes up to which both bodies' circles are used
 constexpr double kNearlyAlike = 0.1;    // of the body's radius: what directions of a ring may differ by
@@ -19,6 +22,7 @@ constexpr double kCore = 1 - 1e-12;     // of the largest ball that rolls inside
 constexpr double kCoreDepth = 0.98;     // ... and of the overlap
 constexpr int kFirstAngles = 7;
 constexpr int kBeside = 3;              // circles looked at on either side of a range of angles
+constexpr double kNearAzimuth = 0.3;    // rad, of a circle's asked azimuth
 constexpr double kChord = 1.05;         // up to 0.5 rad: no less than the angle over its chord or sine
 constexpr double kWidestSecond = 0.88;  // cosine of that
 
@@ -33,7 +37,8 @@ struct View {
   bool circles;            // of M are used
   double tilt = 0;         // sine between the axes, if so
   double mate_error = 0;   // what the mate turns out of itself by, a length of its shape
-  double ball = 0;         // that rolls inside M, whose points are those of its core, the ball's centres
+  double ball = 0;         // that rolls inside M, whose points are those of its core, the ball's centres ...
+  double ball_k = 0;       // ... and inside K
 
   View(const PairFrame& pair, bool k_is_a, bool core) {
     sign = k_is_a ? 1 : -1;
@@ -60,7 +65,9 @@ struct View {
     const double sine = axis.cross(mate_axis).norm();
     circles = m->revolution.found && sine < kNearAxis;
     if (circles) tilt = sine;
-    if (core) ball = kCore * scale_m * std::min(m->curvature.min_radius, m->inner_radius);
+    if (!core) return;
+    ball = kCore * scale_m * std::min(m->curvature.min_radius, m->inner_radius);
+    ball_k = kCore * scale_k * std::min(k->curvature.min_radius, k->inner_radius);
   }
   Vec3 across(const Vec3& x) const { return x - axis.dot(x) * axis; }
 };
@@ -167,7 +174,7 @@ Least least_of_greatest(const Meridian* p, int count, Angle low, Angle high, dou
 
 class RingSearch {
  public:
-  // `core`: of the mate, and the ball that rolls inside it, instead of the mate.
+  // `core`: of the bodies, and the balls that roll inside them, instead of the bodies.
   RingSearch(const PairFrame& pair, bool k_is_a, bool core, double tolerance)
       : pair_(pair), view_(pair, k_is_a, core), tolerance_(tolerance) {
     tangent_ = view_.axis.unitOrthogonal();
@@ -180,8 +187,10 @@ class RingSearch {
 
   bool run(PolytopeResult* result) {
     const Vec3 e = view_.sign * result->bracket.direction;
-    view_.ball = std::min(view_.ball, -kCoreDepth * result->bracket.lower);
-    best_ = -result->bracket.lower - view_.ball;
+    const double depth = -kCoreDepth * result->bracket.lower;
+    view_.ball = std::min(view_.ball, depth);
+    view_.ball_k = std::min(view_.ball_k, std::max(0.0, depth - view_.ball));
+    best_ = -result->bracket.lower - balls();
     best_e_ = e;
     if (!(best_ > tolerance_) || !query(e)) return false;
     choose_mate(e);
@@ -202,8 +211,10 @@ class RingSearch {
   struct Sector {
     double phi, half;
     Angle low, high;
+    double share;  // halved with the sector
   };
 
+  double balls() const { return view_.ball + view_.ball_k; }
   double azimuth(const Vec3& e) const { return std::atan2(second_.dot(e), tangent_.dot(e)); }
   Vec3 outward(double phi) const { return std::cos(phi) * tangent_ + std::sin(phi) * second_; }
   Vec3 direction(const Angle& a, double phi) const { return a.s * outward(phi) + a.c * view_.axis; }
@@ -238,7 +249,7 @@ class RingSearch {
                                         enough / view_.scale_m);
     ++queries_;
     Circle c;
-    const Vec3 x = view_.scale_k * (view_.turn_k * k.point),
+    const Vec3 x = view_.turn_k * (view_.scale_k * k.point - view_.ball_k * k.normal),
                xm = view_.turn_m * (view_.scale_m * m.point - view_.ball * m.normal);
     c.z = view_.axis.dot(x - view_.point);
     c.r = view_.across(x - view_.point).norm();
@@ -253,7 +264,7 @@ class RingSearch {
     }
     c.k = view_.offset - view_.point + c.middle;
     insert(c);
-    const double p = view_.scale_k * k.upper + view_.scale_m * m.upper - view_.ball - e.dot(view_.offset);
+    const double p = view_.scale_k * k.upper + view_.scale_m * m.upper - balls() - e.dot(view_.offset);
     last_ = p;
     last_k_ = k.where;
     last_m_ = m.where;
@@ -266,18 +277,32 @@ class RingSearch {
     return true;
   }
 
-  // Circles are kept by the angle they were asked for: which of them are asked for between two, and some on
-  // either side.
-  struct Range {
-    int first, end;
-  };
-  Range asked_between(const Angle& low, const Angle& high) const {
+  // Circles are kept by the angle they were asked for. Chosen are those asked for in a sector, and some on
+  // either side, of a mate's points some that were asked for at azimuths near the sector's.
+  void choose(const Sector& sector, double half) {
     const auto before = [](const Circle& c, const Angle& a) { return cross(c.at, a) > 0; };
     const Circle* const begin = circle_;
     const Circle* const end = circle_ + count_;
-    const auto first = static_cast<int>(std::lower_bound(begin, end, low, before) - begin),
-               last = static_cast<int>(std::lower_bound(begin, end, high, before) - begin);
-    return {std::max(0, first - kBeside), std::min(count_, last + kBeside)};
+    const auto first = static_cast<int>(std::lower_bound(begin, end, sector.low, before) - begin),
+               last = static_cast<int>(std::lower_bound(begin, end, sector.high, before) - begin);
+    const double reach = std::max(kNearAzimuth, 2 * half);
+    const Vec3 u = outward(sector.phi);
+    const auto near = [&](const Circle& c) {
+      return view_.circles || reach > 1 ||
+             (c.e - c.at.s * u - c.at.c * view_.axis).squaredNorm() <= square(reach * c.at.s);
+    };
+    chosen_ = 0;
+    for (int i = first - 1, beside = 0; i >= 0 && beside < kBeside; --i) {
+      const bool counts = near(circle_[i]);
+      if (counts || first - i <= kBeside) which_[chosen_++] = i;
+      beside += counts;
+    }
+    for (int i = first; i < last; ++i) which_[chosen_++] = i;
+    for (int i = last, beside = 0; i < count_ && beside < kBeside; ++i) {
+      const bool counts = near(circle_[i]);
+      if (counts || i - last < kBeside) which_[chosen_++] = i;
+      beside += counts;
+    }
   }
   void insert(const Circle& c) {
     int at = count_++;
@@ -315,14 +340,14 @@ class RingSearch {
     return {sine, view_.mate_axis.cross(cross) / sine};
   }
 
-  // Of a range of circles for azimuths within `half` of the sector's.
-  void project(const Sector& sector, double half, const Range& range) {
+  // Of the chosen circles for azimuths within `half` of the sector's.
+  void project(const Sector& sector, double half) {
     const double phi = sector.phi;
     const Vec3 u = outward(phi), left = outward(phi - half), right = outward(phi + half);
     const Reach over = reach_of(sector);
     const double cosine = std::cos(half);
-    for (int i = range.first; i < range.end; ++i) {
-      const Circle& c = circle_[i];
+    for (int i = 0; i < chosen_; ++i) {
+      const Circle& c = circle_[which_[i]];
       const Vec3 k = view_.across(c.k);
       double reach = std::max(k.dot(left), k.dot(right));  // the most of k.u over the interval
       if (half >= M_PI) {
@@ -342,16 +367,17 @@ class RingSearch {
   }
 
   Least bound(const Sector& sector, double half, double threshold) {
-    const Range range = asked_between(sector.low, sector.high);
-    project(sector, half, range);
+    choose(sector, half);
+    project(sector, half);
     const Reach over = reach_of(sector);
-    const double turned = over.sine > view_.tilt
-                              ? 0  // circle by circle
-                              : this->turned(over, half, view_.scale_m * view_.m->bounding_radius);
-    Least least = least_of_greatest(meridian_ + range.first, range.end - range.first, sector.low, sector.high,
-                                    threshold + turned + noise_, 4 * kRoundoff * pair_.reach);
-    least.from += range.first;
-    least.to += range.first;
+    double turned = 0;
+    if (!(over.sine > view_.tilt)) {  // else circle by circle
+      double widest = 0;
+      for (int i = 0; i < chosen_; ++i) widest = std::max(widest, circle_[which_[i]].rm);
+      turned = this->turned(over, half, widest);
+    }
+    Least least = least_of_greatest(meridian_, chosen_, sector.low, sector.high, threshold + turned + noise_,
+                                    4 * kRoundoff * pair_.reach);
     least.value -= turned + noise_;
     return least;
   }
@@ -386,8 +412,8 @@ class RingSearch {
     for (const Circle* c : {one, two}) asked = std::max(asked, away(c->at.c - at.c, c->at.s - at.s));
     const Vec3 e = at.s * u + at.c * view_.axis, along = at.c * u - at.s * view_.axis;
     const Mat3 to_k = view_.turn_k.transpose(), to_m = view_.turn_m.transpose();
-    const double of_k =
-        view_.scale_k * least_bend(*view_.k, to_k * e, to_k * along, std::max(range, asked), false);
+    double of_k = view_.scale_k * least_bend(*view_.k, to_k * e, to_k * along, std::max(range, asked), false);
+    of_k = std::max(0.0, of_k - view_.ball_k);
     for (Circle* c : {one, two}) {
       c->r -= of_k * c->at.s;
       c->z -= of_k * c->at.c;
@@ -454,7 +480,7 @@ class RingSearch {
                    f = circle.rm * turned - s * circle.k.dot(across);
       return Slope{ps * s + pc * c, ps * c - pc * s, f};
     };
-    Circle one = circle_[here.from], two = circle_[here.to];
+    Circle one = circle_[which_[here.from]], two = circle_[which_[here.to]];
     const double round = round_off(sector, here.at, u, over, &one, &two);
     const Slope x = slope(one), y = slope(two);
     const double share = x.t * y.t < 0 ? y.t / (y.t - x.t) : x.q > y.q ? 1.0 : 0.0;
@@ -490,15 +516,19 @@ class RingSearch {
   bool close(double phi) {
     Sector stack[kDeepestSector + 2];
     int top = 0, sectors = 0;
-    stack[top++] = {phi, M_PI, {1, 0}, {-1, 0}};
+    double closed = 0;
+    stack[top++] = {phi, M_PI, {1, 0}, {-1, 0}, 1};
     proven_ = kFarAway;
     while (top > 0) {
-      if (++sectors > kMostSectors) return false;
+      const int spent = ++sectors + kCircleCost * count_;
+      if (spent > kMostSpent || (spent > kFirstSpent && closed < kHopeless * spent / kMostSpent))
+        return false;
       Sector& sector = stack[top - 1];
       const double threshold = best_ - kClosedShare * tolerance_;
       const Least wide = bound(sector, sector.half, threshold);
       if (wide.value >= threshold) {
         proven_ = std::min(proven_, wide.value);
+        closed += sector.share;
         --top;
         continue;
       }
@@ -510,11 +540,13 @@ class RingSearch {
       const double second = second_order(sector, here, &narrower);
       if (second >= threshold) {
         proven_ = std::min(proven_, second);
+        closed += sector.share;
         --top;
         continue;
       }
       if (here.value >= best_ - kMeridianShare * tolerance_) {
         if (top > kDeepestSector) return false;
+        sector.share *= 0.5;
         Sector other = sector;
         if (narrower) {
           sector.high = other.low = middle(sector.low, sector.high);
@@ -535,21 +567,21 @@ class RingSearch {
     r->iterations += queries_;
     const Vec3 d = view_.sign * best_e_;
     r->bracket.direction = d;
-    r->bracket.lower = -best_ - view_.ball;
-    r->bracket.upper = std::max(-proven_ - view_.ball, r->bracket.lower);
+    r->bracket.lower = -best_ - balls();
+    r->bracket.upper = std::max(-proven_ - balls(), r->bracket.lower);
     r->converged = true;
     r->points.na = d;
     r->points.nb = -d;
     const double phi = azimuth(best_e_);
-    const Least least = bound({phi, 0, {1, 0}, {-1, 0}}, 0, -kFarAway);
+    const Least least = bound({phi, 0, {1, 0}, {-1, 0}, 0}, 0, -kFarAway);
     // The circles level there, so weighted that the witnesses face each other.
     const Meridian &p = meridian_[least.from], &q = meridian_[least.to];
     const Angle across{-least.at.s, least.at.c};
     const double tp = p.r * across.c + p.z * across.s, tq = q.r * across.c + q.z * across.s;
     const double share = tp != tq ? std::clamp(tq / (tq - tp), 0.0, 1.0) : 1.0;
     Vec3 xk, xm, yk, ym;
-    witness(circle_[least.from], phi, &xk, &xm);
-    witness(circle_[least.to], phi, &yk, &ym);
+    witness(circle_[which_[least.from]], phi, &xk, &xm);
+    witness(circle_[which_[least.to]], phi, &yk, &ym);
     const Vec3 on_k = share * xk + (1 - share) * yk, on_m = share * xm + (1 - share) * ym;
     const bool k_is_a = view_.sign > 0;
     r->points.a = k_is_a ? on_k : on_m;
@@ -563,7 +595,7 @@ class RingSearch {
   }
 
   void witness(const Circle& c, double phi, Vec3* on_k, Vec3* on_m) const {
-    *on_k = view_.point + c.r * outward(phi) + c.z * view_.axis;
+    *on_k = view_.point + c.r * outward(phi) + c.z * view_.axis + view_.ball_k * best_e_;
     *on_m = c.middle - view_.ball * best_e_;
     if (!view_.circles) return;
     const Vec3 e = direction(c.at, phi), square = e - view_.mate_axis.dot(e) * view_.mate_axis;
@@ -580,7 +612,8 @@ class RingSearch {
   SurfacePoint on_k_, on_m_, last_k_, last_m_;
   int count_ = 0, queries_ = 0;
   Circle circle_[kMostCircles];
-  Meridian meridian_[kMostCircles];
+  int chosen_ = 0, which_[kMostCircles];
+  Meridian meridian_[kMostCircles];  // of the chosen
 };
 
 }  // namespace
