@@ -1,10 +1,12 @@
 // Halving of cells, level by level; see surface_bounds.h.
 #include "body/surface_bounds.h"
 
+#include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 #include <limits>
 #include <numeric>
+#include <optional>
 
 #include "nurbs/tolerances.h"
 
@@ -17,7 +19,8 @@ constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr int kLeastRadiusBudget = 4;
 // The same for the proof of convexity, where no hollow is seen: without it every support is doubted.
 constexpr int kConvexBudget = 6;
-constexpr double kBent = 1e-3;  // over the bounding radius: a curvature worth it
+constexpr double kSurelyTurned = 1e-6;  // least over largest coefficient of a volume: far above round-off
+constexpr double kBent = 1e-3;          // over the bounding radius: a curvature worth it
 
 struct Open {
   Leaf leaf;
@@ -62,6 +65,187 @@ std::vector<Cell> first_cells(const Shape& shape, const std::vector<BezierPatch>
   return {whole};
 }
 
+// Bounds of a bilinear patch that is a convex quadrilateral, or a triangle, in a plane up to round-off: of a
+// needle, or with a collapsed edge, its parameters are so uneven that enclosures of them show nothing.
+std::optional<CellBounds> plane_bounds(const BezierPatch& patch, double size) {
+  if (patch.degree_u != 1 || patch.degree_v != 1 || patch.rational) return std::nullopt;
+  const auto corner = [&](int i, int j) { return Vec3(patch.point(i, j).head<3>()); };
+  const Vec3 a = corner(0, 0), b = corner(0, 1), c = corner(1, 0), d = corner(1, 1);
+  const Vec3 twice = (d - a).cross(b - c);  // as long as twice the area
+  const double area = twice.norm();
+  if (!(area > 0)) return std::nullopt;
+  const Vec3 n = twice / area;
+  for (const Vec3& p : {b, c, d})
+    if (!(std::abs(n.dot(p - a)) <= kNoDent * size)) return std::nullopt;
+  // x_u x x_v is bilinear here: positive where it is so at the corners.
+  const double jacobian[4] = {n.dot((c - a).cross(b - a)), n.dot((d - b).cross(b - a)),
+                              n.dot((c - a).cross(d - c)), n.dot((d - b).cross(d - c))};
+  const double least = *std::min_element(jacobian, jacobian + 4);
+  if (!(least >= -kNoDent * area)) return std::nullopt;
+  CellBounds out;
+  out.regular = true;
+  out.axis = n;
+  out.cone = kNoDent;
+  out.min_radius = size / kCurvatureNoise;
+  out.max_radius = out.rate = kInfinity;
+  const double du = std::max((c - a).norm(), (d - b).norm()), dv = std::max((b - a).norm(), (d - c).norm());
+  out.speed_u = dv > 0 ? std::max(least, 0.0) / dv : 0;
+  out.speed_v = du > 0 ? std::max(least, 0.0) / du : 0;
+  return out;
+}
+
+// Whether a patch is an arc of a conic moved along a straight line, up to round-off, bulging outward: no
+// curvature is negative then, which enclosures of a small part of a large body can't tell from round-off.
+bool is_bulging_cylinder(const BezierPatch& patch, double size) {
+  const bool along_u = patch.degree_u == 1;
+  if ((along_u ? patch.degree_v : patch.degree_u) != 2 || (along_u ? patch.degree_u : patch.degree_v) != 1)
+    return false;
+  Vec3 ends[2][3];
+  for (int k = 0; k < 3; ++k) {
+    const Vec4 &a = along_u ? patch.point(0, k) : patch.point(k, 0),
+               &b = along_u ? patch.point(1, k) : patch.point(k, 1);
+    if (!(std::abs(a[3] / b[3] - 1) <= kNoDent)) return false;
+    ends[0][k] = a.head<3>() / a[3];
+    ends[1][k] = b.head<3>() / b[3];
+  }
+  const Vec3 line = ends[1][1] - ends[0][1];
+  for (int k : {0, 2})
+    if (!((ends[1][k] - ends[0][k] - line).norm() <= kNoDent * size)) return false;
+  const Vec3 *x = ends[0], chord = x[2] - x[0], normal = along_u ? line.cross(chord) : chord.cross(line);
+  const double rise = normal.dot(x[1] - x[0]);
+  return rise > kNoDent * size * normal.norm();
+}
+
+double binomial(int n, int k) {
+  double out = 1;
+  for (int i = 1; i <= k; ++i) out = out * (n - k + i) / i;
+  return out;
+}
+
+// A Bernstein net of two parameters, and the products of such nets.
+template <class T>
+struct Form {
+  Form(int m, int n, const T& zero) : m(m), n(n), at((m + 1) * (n + 1), zero) {}
+  T& operator()(int i, int j) { return at[i * (n + 1) + j]; }
+  const T& operator()(int i, int j) const { return at[i * (n + 1) + j]; }
+  int m, n;
+  std::vector<T> at;
+};
+template <class T, class S, class Product>
+auto multiplied(const Form<T>& f, const Form<S>& g, const Product& product) {
+  using Value = decltype(product(f(0, 0), g(0, 0)));
+  Form<Value> out(f.m + g.m, f.n + g.n, product(f(0, 0), g(0, 0)) * 0.0);
+  std::vector<double> in_u, in_v;
+  for (int i = 0; i <= f.m; ++i)
+    for (int k = 0; k <= g.m; ++k)
+      in_u.push_back(binomial(f.m, i) * binomial(g.m, k) / binomial(f.m + g.m, i + k));
+  for (int j = 0; j <= f.n; ++j)
+    for (int l = 0; l <= g.n; ++l)
+      in_v.push_back(binomial(f.n, j) * binomial(g.n, l) / binomial(f.n + g.n, j + l));
+  for (int i = 0; i <= f.m; ++i)
+    for (int k = 0; k <= g.m; ++k)
+      for (int j = 0; j <= f.n; ++j)
+        for (int l = 0; l <= g.n; ++l)
+          out(i + k, j + l) += in_u[i * (g.m + 1) + k] * in_v[j * (g.n + 1) + l] * product(f(i, j), g(k, l));
+  return out;
+}
+
+struct Ball {
+  Vec3 center = Vec3::Zero();
+  double radius = 0;  // 0: none
+};
+
+// The ball on which a patch bulges outward, up to round-off: |x - c|^2 - r^2 is a rational function, and
+// bounded by its net.
+Ball ball_of(const BezierPatch& patch, double size) {
+  const int p = patch.degree_u, q = patch.degree_v;
+  if (!patch.rational || p < 2 || q < 2) return {};
+  // 2 x . c + (r^2 - |c|^2) = |x|^2 at four places.
+  Eigen::Matrix4d places;
+  Vec4 squares;
+  constexpr double kAt[4][2] = {{0, 0.5}, {1, 0.5}, {0.5, 0}, {0.4, 1}};
+  const Vec3 middle = evaluate0(patch, 0.5, 0.5);
+  for (int k = 0; k < 4; ++k) {
+    const Vec3 x = evaluate0(patch, kAt[k][0], kAt[k][1]) - middle;
+    places.row(k) << 2 * x.transpose(), 1;
+    squares[k] = x.squaredNorm();
+  }
+  const Vec4 solution = places.fullPivLu().solve(squares);
+  const Vec3 center = middle + solution.head<3>();
+  const double r2 = solution[3] + solution.head<3>().squaredNorm(), r = std::sqrt(std::max(r2, 0.0));
+  if (!(r > 0 && r < kLongRadius * size)) return {};
+  Form<Vec4> net(p, q, Vec4::Zero());  // about the centre
+  double lightest = kInfinity;
+  for (int i = 0; i <= p; ++i)
+    for (int j = 0; j <= q; ++j) {
+      net(i, j) = patch.point(i, j);
+      net(i, j).head<3>() -= net(i, j)[3] * center;
+      lightest = std::min(lightest, net(i, j)[3]);
+    }
+  const auto off = multiplied(net, net, [&](const Vec4& a, const Vec4& b) {
+    return a.head<3>().dot(b.head<3>()) - r2 * a[3] * b[3];
+  });
+  for (const double f : off.at)
+    if (!(std::abs(f) <= 2 * r * kNoDent * size * lightest * lightest)) return {};
+  const Jet2 j = evaluate2(patch, 0.5, 0.5);
+  return j.su.cross(j.sv).dot(j.s - center) > 0 ? Ball{center, r} : Ball{};
+}
+
+// Whether the net of (x - c) . x_u x x_v shows that a patch on a ball has a normal all over a cell, whatever
+// the angle of its parameter lines: fills in all that is known of it then.
+void on_ball(const Ball& ball, const BezierPatch& patch, Leaf* leaf) {
+  if (ball.radius == 0) return;
+  CellBounds& out = leaf->bounds;
+  const int p = patch.degree_u, q = patch.degree_v;
+  if (!out.regular) {
+    Form<Vec3> x(p, q, Vec3::Zero()), u(p - 1, q, Vec3::Zero()), v(p, q - 1, Vec3::Zero());
+    double heaviest = 0, lightest = kInfinity, weight_u = 0, weight_v = 0, speed_u = 0, speed_v = 0;
+    Vec3 axis = Vec3::Zero();
+    const auto weight = [&](int i, int j) { return leaf->cell.net[i * (q + 1) + j][3]; };
+    for (int i = 0; i <= p; ++i)
+      for (int j = 0; j <= q; ++j) {
+        const Vec4& c = leaf->cell.net[i * (q + 1) + j];
+        x(i, j) = c.head<3>() - c[3] * ball.center;
+        axis += x(i, j);
+        heaviest = std::max(heaviest, c[3]);
+        lightest = std::min(lightest, c[3]);
+      }
+    for (int i = 0; i <= p; ++i)
+      for (int j = 0; j <= q; ++j) {
+        if (i < p) {
+          u(i, j) = p * (x(i + 1, j) - x(i, j));
+          speed_u = std::max(speed_u, u(i, j).norm());
+          weight_u = std::max(weight_u, p * std::abs(weight(i + 1, j) - weight(i, j)));
+        }
+        if (j < q) {
+          v(i, j) = q * (x(i, j + 1) - x(i, j));
+          speed_v = std::max(speed_v, v(i, j).norm());
+          weight_v = std::max(weight_v, q * std::abs(weight(i, j + 1) - weight(i, j)));
+        }
+      }
+    const auto normal = multiplied(u, v, [](const Vec3& a, const Vec3& b) -> Vec3 { return a.cross(b); });
+    const auto volume = multiplied(x, normal, [](const Vec3& a, const Vec3& b) { return a.dot(b); });
+    const auto [least, most] = std::minmax_element(volume.at.begin(), volume.at.end());
+    if (!(*least > kSurelyTurned * *most)) return;
+    out.regular = true;
+    out.axis = axis.normalized();
+    out.cone = 0;
+    double farthest = 0;
+    for (const Vec3& y : x.at) {  // the surface lies in the cone of its net
+      out.cone = std::max(out.cone, std::atan2(out.axis.cross(y).norm(), out.axis.dot(y)));
+      farthest = std::max(farthest, y.norm());
+    }
+    const double area = *least / (heaviest * heaviest * heaviest * ball.radius), w2 = lightest * lightest;
+    out.speed_u = area * w2 / ((speed_v * heaviest + farthest * weight_v) * leaf->cell.du);
+    out.speed_v = area * w2 / ((speed_u * heaviest + farthest * weight_u) * leaf->cell.dv);
+    out.doubt = 0;
+  }
+  out.convex = true;
+  out.min_radius = out.max_radius = ball.radius;
+  out.least_curvature = 1 / ball.radius;
+  out.rate = 0;
+}
+
 bool in_pole_strip(const Shape& shape, const Cell& c) {
   const auto& links = shape.links[c.patch];
   return (links[0].collapsed && c.u0 < kPoleStrip) || (links[1].collapsed && c.u0 + c.du > 1 - kPoleStrip) ||
@@ -87,7 +271,8 @@ void inherit(const CellBounds& whole, CellBounds* half) {
 // Halves of a leaf the better way: where little is known yet both ways are tried, since a needle's cells are
 // a thousand times longer than wide. A way is as good as the better half: the other one may hold what makes
 // the doubt. Where neither helps the cell is a strip that bends more than it is wide, and is cut across.
-std::pair<Leaf, Leaf> split(const BezierPatch& patch, const Leaf& leaf, Wanted wanted, int* cells) {
+std::pair<Leaf, Leaf> split(const BezierPatch& patch, const Leaf& leaf, Wanted wanted, const Ball& ball,
+                            int* cells) {
   const auto halves = [&](bool in_u) {
     std::pair<Leaf, Leaf> pair;
     halve(patch, leaf.cell, in_u, &pair.first.cell, &pair.second.cell);
@@ -95,6 +280,7 @@ std::pair<Leaf, Leaf> split(const BezierPatch& patch, const Leaf& leaf, Wanted w
       ++*cells;
       half->bounds = enclose(patch, half->cell, wanted);
       inherit(leaf.bounds, &half->bounds);
+      on_ball(ball, patch, half);
     }
     return pair;
   };
@@ -146,15 +332,29 @@ class Bounder {
     sphere_ = sphere;
     out_.seen_min = kInfinity;
     out_.even = shape_.patches;
-    for (BezierPatch& patch : out_.even) changes_.push_back(even_out(&patch));
-    for (int p = 0; p < patches_; ++p)
+    for (BezierPatch& patch : out_.even) {
+      changes_.push_back(even_out(&patch));
+      const auto& links = shape_.links[balls_.size()];  // at poles cells are of another kind
+      const bool pole = std::any_of(links.begin(), links.end(), [](const auto& l) { return l.collapsed; });
+      balls_.push_back(pole ? Ball{} : ball_of(patch, shape_.bounding_radius));
+    }
+    for (int p = 0; p < patches_; ++p) {
+      if (const auto plane = plane_bounds(out_.even[p], shape_.bounding_radius)) {
+        open_.push_back({{whole_patch(out_.even, p), *plane, {}}, 0});
+        ++out_.cells;
+        continue;
+      }
+      const bool bulging = is_bulging_cylinder(shape_.patches[p], shape_.bounding_radius);
       for (Cell& c : first_cells(shape_, out_.even, p)) {
         Leaf leaf{std::move(c), {}, {}};
         leaf.bounds = enclose(out_.even[p], leaf.cell, wanted(leaf.cell));
+        on_ball(balls_[p], out_.even[p], &leaf);
+        if (bulging) leaf.bounds.least_curvature = std::max(leaf.bounds.least_curvature, 0.0);
         ++out_.cells;
         see(leaf);
         open_.push_back({std::move(leaf), 0});
       }
+    }
     const int most = kMostCells + kMostCellsPerPatch * patches_;
     if (!sphere_) halve_while([this](const Open& o) { return least_loose(o); }, kLeastRadiusBudget * most);
     const int base = std::max(most, out_.cells + most / 2);
@@ -188,6 +388,7 @@ class Bounder {
       CellBounds rated = enclose(out_.even[o.leaf.cell.patch], o.leaf.cell, {true, wanted_.stretch});
       inherit(o.leaf.bounds, &rated);
       o.leaf.bounds = rated;
+      on_ball(balls_[o.leaf.cell.patch], out_.even[o.leaf.cell.patch], &o.leaf);
       see_rate(o.leaf);
     }
   }
@@ -216,7 +417,8 @@ class Bounder {
         Open& o = open_[i];
         if (out_.cells >= most_cells || o.depth >= kDeepestCell || !loose(o)) continue;
         const int depth = o.depth + 1;
-        auto [a, b] = split(out_.even[o.leaf.cell.patch], o.leaf, wanted(o.leaf.cell), &out_.cells);
+        const int p = o.leaf.cell.patch;
+        auto [a, b] = split(out_.even[p], o.leaf, wanted(o.leaf.cell), balls_[p], &out_.cells);
         see(a);
         see(b);
         o = {std::move(a), depth};
@@ -279,7 +481,7 @@ class Bounder {
     out_.rates.resize(patches_);
     for (PatchRate& r : out_.rates) r.cells.assign(n * n, none);
     const auto up = [](double x) {
-      return std::nextafter(static_cast<float>(x), std::numeric_limits<float>::infinity());
+      return x == 0 ? 0.0f : std::nextafter(static_cast<float>(x), std::numeric_limits<float>::infinity());
     };
     const auto down = [](double x) { return std::nextafter(static_cast<float>(x), 0.0f); };
     // Cells that a leaf or its rim touches, and those around them.
@@ -310,6 +512,7 @@ class Bounder {
   std::vector<std::pair<Change, Change>> changes_;
   std::vector<Open> open_;
   std::vector<double> seen_rate_;
+  std::vector<Ball> balls_;
   SurfaceBounds out_;
 };
 
@@ -349,7 +552,7 @@ void refine(const Loose& loose, int cells, Wanted wanted, int* spent, SurfaceBou
     for (const int i : level) {
       Leaf& leaf = leaves[i];
       if (*spent >= cells || !loose(leaf.bounds) || leaf.cell.du * leaf.cell.dv < kLeastNormalCell) continue;
-      auto [a, b] = split(bounds->even[leaf.cell.patch], leaf, wanted, spent);
+      auto [a, b] = split(bounds->even[leaf.cell.patch], leaf, wanted, {}, spent);
       leaf = std::move(a);
       next.push_back(i);
       next.push_back(static_cast<int>(leaves.size()));
@@ -375,10 +578,14 @@ void refine_normals(double round, double flat, double spread, int cells, Surface
 
 void refine_stretches(double cone, double tightness, int cells, SurfaceBounds* bounds) {
   int spent = 0;
-  const auto loose = [&](const CellBounds& b) {
-    return b.regular && b.convex && b.cone > cone && tightness * b.stretch.least < b.seen_min;
-  };
-  refine(loose, cells, {false, true}, &spent, bounds);
+  for (const double first :
+       {2.0, 1.4, 1.2, 1.0}) {  // what is worst of all first: the rest may be all there is
+    const double aim = std::max(first, tightness);
+    const auto loose = [&](const CellBounds& b) {
+      return b.regular && b.convex && b.cone > cone && aim * b.stretch.least < b.seen_min;
+    };
+    refine(loose, cells, {false, true}, &spent, bounds);
+  }
 }
 
 }  // namespace nurbs

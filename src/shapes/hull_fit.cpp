@@ -50,9 +50,13 @@ constexpr double kAim = 0.97, kOutwardAim = 0.93;  // of a tolerance, left to sa
 constexpr double kFirstSlide = 0.05, kFreeSlide = 0.15;
 constexpr double kPlaneShare = 0.02;  // of the tolerance: faces that are plane to this may be one
 constexpr size_t kMostFaces = 60;     // of a polyhedron with rounded edges ...
-constexpr int kRoundings = 2;         // ... whose radius is found by the distance of the first one
-constexpr int kHalvings = 12;         // ... and that is halved where it fits nowhere
-constexpr int kRimPoints = 96;        // of a circle, at which its distance from the hull is looked at
+constexpr size_t kMostFacesAtLast =
+    300;  // ... where nothing else is within the tolerance: seconds to load, and contacts are slow
+constexpr int kBisections = 14;      // of a rounding that the hull has already ...
+constexpr double kSurelyNear = 0.1;  // ... unless it is as near as this share of the tolerance
+constexpr int kRoundings = 2;        // ... whose radius is found by the distance of the first one
+constexpr int kHalvings = 12;        // ... and that is halved where it fits nowhere
+constexpr int kRimPoints = 96;       // of a circle, at which its distance from the hull is looked at
 constexpr double kRimCut = 0.7,
                  kChordCut = 0.25;    // of the tolerance: what corners and a coarser profile take
 constexpr size_t kMostProfile = 400;  // corners of the hull's own profile ...
@@ -327,11 +331,15 @@ class HullFitter {
     if (options_.spans == 0 && try_sphere()) return best_;
     const ConvexHull even_hull = hull_.image(frame_.to, -frame_.to * frame_.center);
     const RayTarget target(even_hull);
+    const auto& p = even_hull.mesh().points;
+    for (const auto& t : even_hull.mesh().triangles)
+      face_area_ = std::max(face_area_, 0.5 * (p[t[1]] - p[t[0]]).cross(p[t[2]] - p[t[0]]).norm());
     const bool any = options_.spans == 0;
     int further = 0;
     for (const auto& [degree, spans] : kLadder) {
       if ((!any && spans != options_.spans) || too_many(degree, spans)) continue;
-      if (spans > 1 && any && (try_revolution() || try_polyhedron())) return best_;
+      if (spans > 1 && any && (try_revolution() || try_polyhedron(kMostFaces) || try_round_edges()))
+        return best_;
       if (any && too_coarse(degree, spans)) continue;
       if (any && spans > 1 && dents_ == kMostDents) break;
       if (any && spans > 1 && start_error_ > kFine * tolerance_ && !polynomials_may_do(even_hull)) break;
@@ -348,6 +356,8 @@ class HullFitter {
       if (best_.shape && further++ == kFurther) break;
     }
     if (best_.shape) return best_;  // its convexity is measured, not proven
+    if (any && options_.most_points == 0 && try_polyhedron(kMostFacesAtLast)) return best_;
+    if (best_.shape) return best_;
     if (options_.most_points > 0)
       throw ShapeError("no body of at most " + std::to_string(options_.most_points) +
                        " control points is within the tolerance of " + percent(options_.tolerance) +
@@ -429,12 +439,12 @@ class HullFitter {
 
   // The hull of a few faces with its edges rounded, as far as its corners allow: creases are dear to splines.
   // Rounded coordinates far from the origin leave faces less plane than single precision does near it.
-  bool try_polyhedron() {
-    if (polyhedron_tried_) return false;
-    polyhedron_tried_ = true;
+  bool try_polyhedron(size_t most_faces) {
+    if (faces_tried_ >= most_faces) return false;
+    faces_tried_ = most_faces;
     size_t tried = 0;
     for (double roundoff : {std::max(kSingleRoundoff, kPlaneShare * options_.tolerance), kSingleRoundoff}) {
-      const std::vector<HalfSpace> faces = facets(hull_, kMostFaces, roundoff);
+      const std::vector<HalfSpace> faces = facets(hull_, most_faces, roundoff);
       if (faces.empty() || faces.size() == tried) continue;
       tried = faces.size();
       if (try_rounded(faces)) return true;
@@ -442,8 +452,40 @@ class HullFitter {
     return false;
   }
 
+  // A polyhedron whose edges are round already, by more than the tolerance allows: of a rounding too small
+  // the body stands out of the hull, of one too large it stays behind. Bisection to where both are equal.
+  bool try_round_edges() {
+    if (round_edges_tried_) return false;
+    round_edges_tried_ = true;
+    for (const std::vector<HalfSpace>& faces : large_faces(hull_)) {
+      double low = 0, high = kFar, least = kFar;
+      for (const HalfSpace& f : faces) high = std::min(high, f.offset - f.normal.dot(mass_.center));
+      std::vector<NurbsSurface> best;
+      for (int k = 0; k < kBisections && least > kSurelyNear * tolerance_; ++k) {
+        const double rounding = 0.5 * (low + high);
+        try {
+          const auto body = make_shape("fit", rounded_polyhedron(faces, mass_.center, rounding));
+          const HullDistance d = hull_distance(*body, hull_, 0.01 * tolerance_);
+          if (d.worst() < least) {
+            least = d.worst();
+            best = body->surfaces;
+          }
+          (d.outward > d.inward ? low : high) = rounding;
+        } catch (const ShapeError&) {  // too round, or its faces don't close
+          high = rounding;
+        }
+      }
+      if (!best.empty() && judge(std::move(best), rounded_kind(faces.size()), true)) return true;
+    }
+    return false;
+  }
+
+  static std::string rounded_kind(size_t faces) {
+    return "polyhedron of " + std::to_string(faces) + " faces with rounded edges";
+  }
+
   bool try_rounded(const std::vector<HalfSpace>& faces) {
-    const std::string kind = "polyhedron of " + std::to_string(faces.size()) + " faces with rounded edges";
+    const std::string kind = rounded_kind(faces.size());
     const auto rounded = [&](double rounding) {
       return make_shape("fit", rounded_polyhedron(faces, mass_.center, rounding));
     };
@@ -535,6 +577,9 @@ class HullFitter {
     GaugeFitOptions options = gauge_options();
     for (double share : kGaugeCurvatures) {
       options.least_curvature = std::clamp(share * tolerance_ / radius_, kLeastCurvature, kMostCurvature);
+      // A face must bulge by less than the tolerance.
+      if (share > kGaugeCurvatures[2] && 0.5 * options.least_curvature * face_area_ > tolerance_ / radius_)
+        continue;
       for (int pass = 0; pass < 2; ++pass) {  // what certifies further away is asked to be nearer
         GaugeFit fit = fit_gauge(degree, spans, even, options);
         gauge_error_ = fit.error * kAim * tolerance_;
@@ -629,8 +674,10 @@ class HullFitter {
   std::vector<NurbsSurface> start_;
   int dents_ = 0, start_degree_ = 0, start_spans_ = 0, gauge_spans_ = 0;
   double gauge_error_ = kFar;
-  HullDistance judged_;  // of the last body that loaded without a dent
-  bool polyhedron_tried_ = false, revolution_tried_ = false;
+  double face_area_ = 0;    // of the hull's largest triangle, where it is about as wide in all directions
+  HullDistance judged_;     // of the last body that loaded without a dent
+  size_t faces_tried_ = 0;  // of polyhedra, at the most
+  bool round_edges_tried_ = false, revolution_tried_ = false;
   HullFit best_;
 };
 

@@ -1,6 +1,7 @@
 // Eroded polyhedron by polarity, its faces, edges and corners, and a patch or two for each.
 #include "shapes/rounded_polyhedron.h"
 
+#include <Eigen/LU>
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -16,6 +17,10 @@ namespace {
 
 constexpr double kSameSide = 0.9;    // cosine of normals: narrow triangles within a plane have poor ones
 constexpr double kSamePoint = 1e-9;  // of the extent
+// Triangles looked at for the planes of large faces, by how much those are larger than the next one, and of
+// how many faces such a body has at the most.
+constexpr size_t kLargestTriangles = 200, kMostLargeFaces = 30;
+constexpr double kMuchLarger = 2.5, kSamePlane = 1e-3;
 
 // A face of the eroded polyhedron: unit normal and vertices, counterclockwise from outside.
 struct Face {
@@ -50,11 +55,13 @@ std::vector<Vec3> eroded_corners(const std::vector<HalfSpace>& faces, const Vec3
   const ConvexHull hull(polar);
   std::vector<Vec3> corners;
   for (const auto& t : hull.mesh().triangles) {
+    const auto& q = hull.mesh().points;
     const Vec3 n = facet_normal(hull.mesh(), t);
-    const double h = n.dot(hull.mesh().points[t[0]]);
-    if (!(h > 1e-9 * n.norm() * hull.mesh().points[t[0]].norm()))
+    if (!(n.dot(q[t[0]]) > 1e-9 * n.norm() * q[t[0]].norm()))
       throw ShapeError("the faces do not close around the body");
-    corners.emplace_back(n / h);
+    Mat3 planes;  // q . x = 1: solved as they are, for a narrow triangle's own plane has lost digits
+    planes << q[t[0]].transpose(), q[t[1]].transpose(), q[t[2]].transpose();
+    corners.emplace_back(planes.fullPivLu().solve(Vec3::Ones()));
   }
   const double same = kSamePoint * extent(corners);
   std::vector<Vec3> distinct;
@@ -352,6 +359,50 @@ std::vector<HalfSpace> facets(const ConvexHull& hull, size_t most, double roundo
   }
   for (HalfSpace& s : out)
     for (const Vec3& p : hull.mesh().points) s.offset = std::max(s.offset, s.normal.dot(p));
+  return out;
+}
+
+std::vector<std::vector<HalfSpace>> large_faces(const ConvexHull& hull) {
+  const std::vector<Vec3>& points = hull.mesh().points;
+  const double near = kSingleRoundoff * extent(points);
+  struct Triangle {
+    Vec3 normal;  // as long as twice the area
+    Vec3 corner;
+  };
+  std::vector<Triangle> all;
+  for (const auto& t : hull.mesh().triangles) all.push_back({facet_normal(hull.mesh(), t), points[t[0]]});
+  const auto larger = [](const Triangle& a, const Triangle& b) {
+    return a.normal.squaredNorm() > b.normal.squaredNorm();
+  };
+  std::stable_sort(all.begin(), all.end(), larger);
+  struct Plane {
+    HalfSpace space;
+    double area;
+  };
+  std::vector<Plane> planes;
+  for (size_t k = 0; k < all.size(); ++k) {
+    const double area = all[k].normal.norm();
+    const Vec3 n = all[k].normal / area;
+    if (!n.allFinite()) continue;
+    const auto same = [&](const Plane& p) {
+      return p.space.normal.dot(n) > kSameSide &&
+             std::abs(p.space.normal.dot(all[k].corner) - p.space.offset) < near &&
+             p.space.normal.cross(n).norm() < kSamePlane;
+    };
+    const auto of = std::find_if(planes.begin(), planes.end(), same);
+    if (of != planes.end())
+      of->area += area;
+    else if (k < kLargestTriangles)
+      planes.push_back({{n, n.dot(all[k].corner)}, area});
+  }
+  std::stable_sort(planes.begin(), planes.end(),
+                   [](const Plane& a, const Plane& b) { return a.area > b.area; });
+  std::vector<std::vector<HalfSpace>> out;
+  for (size_t k = 4; k < planes.size() && k <= kMostLargeFaces; ++k) {
+    if (planes[k - 1].area < kMuchLarger * planes[k].area) continue;
+    out.emplace_back();
+    for (size_t i = 0; i < k; ++i) out.back().push_back(planes[i].space);
+  }
   return out;
 }
 

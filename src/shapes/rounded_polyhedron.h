@@ -21,6 +21,10 @@ constexpr double kSingleRoundoff = 1e-6;
 // `most`.
 std::vector<HalfSpace> facets(const ConvexHull& hull, size_t most, double roundoff = kSingleRoundoff);
 
+// The planes of a hull's largest faces where those are much larger than the rest, as with a box whose edges
+// are round; the fewest first, at least four. Empty where no face stands out.
+std::vector<std::vector<HalfSpace>> large_faces(const ConvexHull& hull);
+
 // Those of a Platonic solid with corners on the sphere of `radius` about the origin: tetrahedron, cube,
 // octahedron, dodecahedron, icosahedron. Empty for another name.
 std::vector<HalfSpace> platonic_solid(const std::string& name, double radius);

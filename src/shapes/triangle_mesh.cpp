@@ -74,6 +74,18 @@ std::vector<EdgeUse> sorted_edges(const TriangleMesh& mesh) {
 
 }  // namespace
 
+Eigen::AlignedBox3d bounding_box(const std::vector<Vec3>& points) {
+  Eigen::AlignedBox3d box;
+  for (const Vec3& p : points) box.extend(p);
+  return box;
+}
+
+Vec3 move_to_origin(std::vector<Vec3>& points) {
+  const Vec3 middle = bounding_box(points).center();
+  for (Vec3& p : points) p -= middle;
+  return middle;
+}
+
 TriangleMesh weld(const TriangleMesh& mesh, double tolerance) {
   std::unordered_map<std::array<std::int64_t, 3>, int, CellHash> cells;
   const double inverse = 1 / std::max(tolerance, 1e-300);
@@ -215,9 +227,7 @@ MeshDefects orient(TriangleMesh& mesh) {
 
 // Tetrahedra from a point amid to the triangles; second moments by the corners' sums.
 MassProperties mesh_properties(const TriangleMesh& mesh) {
-  Eigen::AlignedBox3d box;
-  for (const Vec3& p : mesh.points) box.extend(p);
-  const Vec3 from = mesh.points.empty() ? Vec3(Vec3::Zero()) : Vec3(box.center());
+  const Vec3 from = mesh.points.empty() ? Vec3(Vec3::Zero()) : Vec3(bounding_box(mesh.points).center());
   double volume = 0;
   Vec3 first = Vec3::Zero();
   Mat3 second = Mat3::Zero();

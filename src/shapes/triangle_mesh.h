@@ -1,6 +1,7 @@
 // Triangle meshes as they come from scanners and CAD: made one closed surface with an inside, or refused.
 #pragma once
 
+#include <Eigen/Geometry>
 #include <array>
 #include <string>
 #include <vector>
@@ -14,6 +15,11 @@ struct TriangleMesh {
   std::vector<Vec3> points;
   std::vector<std::array<int, 3>> triangles;
 };
+
+Eigen::AlignedBox3d bounding_box(const std::vector<Vec3>& points);
+
+// Moves points so that the middle of their bounding box is the origin; returns where it was.
+Vec3 move_to_origin(std::vector<Vec3>& points);
 
 // Points of equal coordinates become one, and so do points closer than `tolerance` (length) that share a cell
 // of that size; triangles that lose a corner go, and so do repeated ones. Points no triangle uses go too.

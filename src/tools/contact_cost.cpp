@@ -106,10 +106,10 @@ ContactCost measure_contact_cost(const Shape& shape) {
 }
 
 std::string cost_class(const ContactCost& cost) {
-  if (cost.cold < 250) return "as a sphere";
-  if (cost.turning < 600) return "cheap, as smooth ovals";
-  if (cost.turning < 3000) return "dear, as bodies with flats or fine detail";
-  return "very dear: is a simpler body near enough (fit, simplify)?";
+  if (cost.cold < 250) return "about a sphere's";
+  if (cost.turning < 800) return "low, as of smooth ovals";
+  if (cost.turning < 5000) return "middling, as of bodies with flat faces or fine detail";
+  return "high: is a simpler body near enough (fit or simplify with a larger --tolerance)?";
 }
 
 }  // namespace nurbs

@@ -25,9 +25,7 @@ constexpr int kSampleGrid =
     64;  // per patch parameter of a body to simplify, over all Bezier patches of a side
 
 double extent(const TriangleMesh& mesh) {
-  Eigen::AlignedBox3d box;
-  for (const Vec3& p : mesh.points) box.extend(p);
-  return box.diagonal().norm();
+  return bounding_box(mesh.points).diagonal().norm();
 }
 
 std::string piece_list(const std::vector<TriangleMesh>& pieces) {
@@ -92,12 +90,6 @@ int spans_of(const std::string& patches) {
   throw UsageError("--patches is " + patches + ", must be 6, 24, 54, 96, 216, 384, 600 or 864");
 }
 
-Vec3 middle(const TriangleMesh& mesh) {
-  Eigen::AlignedBox3d box;
-  for (const Vec3& p : mesh.points) box.extend(p);
-  return box.center();
-}
-
 // Whether coordinates that lost digits tell less of a body, by which contacts are found.
 bool is_worse(const Shape& a, const Shape& b) {
   return (b.smooth && !a.smooth) || (b.proofs.convex && !a.proofs.convex) ||
@@ -139,22 +131,23 @@ HullFit fit_with_progress(const ConvexHull& hull, double tolerance, int spans, s
 
 }  // namespace
 
-std::shared_ptr<const Shape> put_in_place(const std::string& file, const std::string& output,
-                                          const Vec3& place, ShapeFileContent& content) {
-  auto about_origin = make_shape(output, content.surfaces, content.gyration);
-  const double radii = (about_origin->mass.center + place).norm() / about_origin->bounding_radius;
+bool is_far(const Shape& shape, const Vec3& place) {
+  return (shape.mass.center + place).norm() > kSurelyKept * shape.bounding_radius;
+}
+
+void put_in_place(const std::string& file, const Shape& about_origin, const Vec3& place,
+                  std::vector<NurbsSurface>& surfaces) {
+  const double radii = (about_origin.mass.center + place).norm() / about_origin.bounding_radius;
   if (radii <= kFarthestKept) {
-    std::vector<NurbsSurface> surfaces = content.surfaces;
-    transform(surfaces, Mat3::Identity(), place);
-    auto placed = make_shape(output, surfaces, content.gyration);
-    if (radii <= kSurelyKept || !is_worse(*placed, *about_origin)) {
-      content.surfaces = std::move(surfaces);
-      return placed;
+    std::vector<NurbsSurface> placed = surfaces;
+    transform(placed, Mat3::Identity(), place);
+    if (!is_far(about_origin, place) || !is_worse(*make_shape(file, placed), about_origin)) {
+      surfaces = std::move(placed);
+      return;
     }
   }
   std::printf("%s: lies %.2g radii from the origin; moved to it, by %.17g %.17g %.17g, for the digits\n",
               file.c_str(), radii, -place[0], -place[1], -place[2]);
-  return about_origin;
 }
 
 double fit_tolerance(const std::string& command, const std::string& text) {
@@ -175,8 +168,7 @@ void fit_mesh(const FitArguments& a, const TriangleMesh& raw) {
       throw UsageError("fit: --keep is " + a.keep + ", must be volume, inertia or volume,inertia");
   }
   TriangleMesh mesh = closed_piece(a, raw);
-  const Vec3 place = middle(mesh);
-  for (Vec3& p : mesh.points) p -= place;  // all else is about the origin
+  const Vec3 place = move_to_origin(mesh.points);  // all else is about the origin
   const MassProperties own = mesh_properties(mesh);
   if (!(own.volume > 0)) throw ShapeError(a.file + ": encloses no volume");
   std::unique_ptr<ConvexHull> hull;
@@ -198,7 +190,8 @@ void fit_mesh(const FitArguments& a, const TriangleMesh& raw) {
   }
   if (keep_inertia) content.gyration = own.inertia / own.volume;
   const auto centered = keep_volume ? make_shape("fit", content.surfaces) : best.shape;
-  const auto shape = put_in_place(a.file, a.output, place, content);
+  put_in_place(a.file, *centered, place, content.surfaces);
+  const auto shape = make_shape(a.output, content.surfaces, content.gyration);
   if (keep_inertia) mass.inertia = own.inertia / own.volume * mass.volume;
   write_whole(a.output, write_shape(content));
   size_t points = 0;
@@ -269,7 +262,8 @@ void simplify(const FitArguments& a) {
   ShapeFileContent content{best.surfaces, std::nullopt};
   if ((read->gyration - read->mass.inertia / read->mass.volume).norm() > 1e-9 * read->gyration.norm())
     content.gyration = read->gyration;  // given in the file
-  put_in_place(a.file, a.output, place, content);
+  put_in_place(a.file, *best.shape, place, content.surfaces);
+  make_shape(a.output, content.surfaces, content.gyration);  // it loads
   write_whole(a.output, write_shape(content));
   std::printf("%s: %s; %zu control points in place of %zu\n", a.output.c_str(), best.kind.c_str(),
               control_points(best.surfaces), control_points(shape->surfaces));

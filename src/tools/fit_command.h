@@ -1,10 +1,10 @@
 // The fit of meshes, for commands that make their own.
 #pragma once
 
-#include <memory>
 #include <string>
+#include <vector>
 
-#include "io/shape_file.h"
+#include "body/shape.h"
 #include "shapes/triangle_mesh.h"
 
 namespace nurbs {
@@ -18,10 +18,13 @@ struct FitArguments {
 // Fits, writes and reports as `nurbs-shape fit` does; throws UsageError or ShapeError with nothing written.
 void fit_mesh(const FitArguments& a, const TriangleMesh& raw);
 
-// Moves a body that was made about the origin to its `place` in `file`, unless that is so far away that
-// coordinates lose digits which its joints and curvatures need: says so then, and leaves it. What is written.
-std::shared_ptr<const Shape> put_in_place(const std::string& file, const std::string& output,
-                                          const Vec3& place, ShapeFileContent& content);
+// Whether a body, moved by `place`, is so far from the origin that its coordinates may lose digits.
+bool is_far(const Shape& shape, const Vec3& place = Vec3::Zero());
+
+// Moves the surfaces of a body that was made about the origin to its `place` in `file`, unless that is so far
+// away that they lose digits which joints and curvatures need: says so then, and leaves them.
+void put_in_place(const std::string& file, const Shape& about_origin, const Vec3& place,
+                  std::vector<NurbsSurface>& surfaces);
 
 // The share that --tolerance states; throws UsageError.
 double fit_tolerance(const std::string& command, const std::string& text);

@@ -24,7 +24,6 @@ namespace {
 
 constexpr double kSagShare = 0.1;  // of the tolerance, left to the triangles a fit begins with
 
-constexpr double kNearby = 10;  // radii from the origin: coordinates have all the digits that matter
 constexpr double kSecondsToRead = 10, kSecondsPerMegabyte = 10, kSecondsToMesh = 30;  // of a processor
 
 struct Arguments {
@@ -71,12 +70,14 @@ std::string take_exact(const Arguments& a, const CadSolid& solid) {
     const std::string why = error.what();
     return why.rfind(a.file + ": ", 0) == 0 ? why.substr(a.file.size() + 2) : why;
   }
-  ShapeFileContent content{shape->surfaces, std::nullopt};
-  if (shape->mass.center.norm() > kNearby * shape->bounding_radius) {
-    transform(content.surfaces, Mat3::Identity(), -shape->mass.center);
-    shape = put_in_place(a.file, a.output, shape->mass.center, content);
+  if (is_far(*shape)) {
+    const Vec3 place = shape->mass.center;
+    std::vector<NurbsSurface> surfaces = shape->surfaces;
+    transform(surfaces, Mat3::Identity(), -place);
+    put_in_place(a.file, *make_shape(a.file, surfaces), place, surfaces);
+    shape = make_shape(a.output, surfaces);
   }
-  write_whole(a.output, write_shape(content));
+  write_whole(a.output, write_shape({shape->surfaces, std::nullopt}));
   print_warnings(warnings);
   std::printf("%s: exact, %zu patches, volume %.10g, bounding radius %.6g\n", a.output.c_str(),
               shape->surfaces.size(), shape->mass.volume, shape->bounding_radius);

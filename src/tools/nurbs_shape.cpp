@@ -366,16 +366,14 @@ Body make_rounded_polyhedron(const Options& options) {
   const std::string file = options.text("--mesh");
   try {
     std::vector<Vec3> points = read_mesh_file(file).points;
-    Eigen::AlignedBox3d box;
-    for (const Vec3& p : points) box.extend(p);
-    for (Vec3& p : points) p -= box.center();
+    const Vec3 place = move_to_origin(points);
     const ConvexHull hull(points);
     const std::vector<HalfSpace> faces = facets(hull, kMostFacets);
     if (faces.empty())
       throw ShapeError("its hull has more than " + std::to_string(kMostFacets) + " faces: use fit");
-    ShapeFileContent content{rounded_polyhedron(faces, hull.properties().center, rounding), std::nullopt};
-    put_in_place(file, options.output(), box.center(), content);
-    return outward(std::move(content.surfaces));
+    std::vector<NurbsSurface> surfaces = rounded_polyhedron(faces, hull.properties().center, rounding);
+    put_in_place(file, *make_shape(file, surfaces), place, surfaces);
+    return outward(std::move(surfaces));
   } catch (const ShapeError& error) {
     const std::string what = error.what();
     throw ShapeError(what.rfind(file, 0) == 0 ? what : file + ": " + what);
@@ -687,34 +685,37 @@ void print_descriptors(const Shape& shape) {
 // What contacts cost, and why.
 void print_cost(const Shape& shape) {
   const ContactCost cost = measure_contact_cost(shape);
-  std::printf("cost class         %s\n", cost_class(cost).c_str());
+  std::printf("cost of a contact  %s\n", cost_class(cost).c_str());
   std::printf(
-      "  a contact here   %.0f ns resting, %.0f ns turning (1 mrad a step), %.0f ns cold, with its like\n",
+      "  of its like, here  %.0f ns a step at rest, %.0f ns turning (1 mrad a step), %.0f ns when it "
+      "begins\n",
       cost.resting, cost.turning, cost.cold);
-  if (cost.unresolved > 0) std::printf("  unresolved       %d of the cold contacts\n", cost.unresolved);
-  std::printf(
-      "kind               %s\n",
-      shape.proofs.sphere     ? "sphere: contacts take the closed form"
-      : shape.ellipsoid.found ? "ellipsoid: contacts take the closed form"
-      : !shape.smooth
-          ? "creased: contacts along faces and creases are followed, new ones take the polytope method"
-      : shape.concavity > kUnmentionedDent * shape.bounding_radius ? "dented: bridged by the convex hull"
-      : std::isinf(shape.patch_curvature.max_radius)
-          ? "smooth with flats: faces that lie on each other touch at up to eight points"
-          : "smooth, strictly convex: the fast path throughout");
+  if (cost.unresolved > 0)
+    std::printf("  unresolved       %d of those that begin: an estimate serves\n", cost.unresolved);
+  std::printf("kind               %s\n",
+              shape.proofs.sphere     ? "sphere: contacts by a formula, nothing is searched"
+              : shape.ellipsoid.found ? "ellipsoid: contacts by a formula, nothing is searched"
+              : !shape.smooth         ? "with sharp edges: contacts that begin at one need a slower search"
+              : shape.concavity > kUnmentionedDent * shape.bounding_radius
+                  ? "dented: touches as its convex hull does, without the dents"
+              : std::isinf(shape.patch_curvature.max_radius)
+                  ? "smooth with flats: faces that lie on each other touch at up to eight points"
+                  : "smooth, strictly convex: round everywhere, which makes contacts fastest");
 }
 
 void print_form(const Shape& shape) {
   const Kinks kinks = worst_kinks(shape);
-  std::printf("bounding radius    %.12g\n", shape.bounding_radius);
-  std::printf("inner radius       %.12g\n", shape.inner_radius);
+  std::printf("bounding radius    %.12g (farthest point from the centre of mass)\n", shape.bounding_radius);
+  std::printf("inner radius       %.12g (of a ball about the centre of mass that fits inside)\n",
+              shape.inner_radius);
   std::printf("curvature radius   %.6g to %.6g inside the patches\n", shape.patch_curvature.min_radius,
               shape.patch_curvature.max_radius);
-  std::printf("worst kink         %.3g degrees opening, %.3g closing%s\n", kinks.opening, kinks.closing,
-              shape.smooth ? " (smooth)" : "");
-  std::printf("concavity          %.3g (%.3g of the bounding radius)\n", shape.concavity,
+  std::printf("sharpest joint     %.3g degrees outward, %.3g inward%s\n", kinks.opening, kinks.closing,
+              shape.smooth ? " (smooth: no edges)" : "");
+  std::printf("deepest dent       %.3g (%.3g of the bounding radius)\n", shape.concavity,
               shape.concavity / shape.bounding_radius);
-  std::printf("memory             %.1f kB\n", static_cast<double>(memory(shape)) / 1024);
+  std::printf("memory             %.1f kB, whatever the number of particles\n",
+              static_cast<double>(memory(shape)) / 1024);
 }
 
 void info(const std::string& file) {
@@ -734,7 +735,7 @@ void check(const std::string& file) {
   const auto shape = read_shape_file(file, &warnings);
   print_warnings(warnings);
   const Kinks kinks = worst_kinks(*shape);
-  std::printf("%s: usable: closed, outward%s, %zu patches, worst kink %.3g degrees, concavity %.3g\n",
+  std::printf("%s: usable: closed, outward%s, %zu patches, sharpest joint %.3g degrees, deepest dent %.3g\n",
               file.c_str(), warnings.empty() ? ", convex" : "", shape->surfaces.size(),
               std::max(kinks.opening, kinks.closing), shape->concavity);
   for (const std::string& line : describe_proofs(*shape)) std::printf("  %s\n", line.c_str());

@@ -244,10 +244,10 @@ class NurbsShape(unittest.TestCase):
         for kind, options in (("sphere", []), ("pebble", []), ("box", ["--axes", "1,1,1"])):
             self.assertEqual(call("make", kind, *options, "-o", str(self.file)).returncode, 0)
             info = call("info", str(self.file)).stdout
-            self.assertRegex(info, r"cost class +\S")
+            self.assertRegex(info, r"cost of a contact +\S")
             self.assertNotIn("unresolved", info)
             costs[kind] = [float(x) for x in re.search(
-                r"a contact here +(\d+) ns resting, (\d+) ns turning .*, (\d+) ns cold", info).groups()]
+                r"like, here +(\d+) ns a step at rest, (\d+) ns turning .*, (\d+) ns when", info).groups()]
         self.assertLess(costs["sphere"][1], costs["pebble"][1])
         for resting, turning, cold in (costs["sphere"], costs["pebble"]):
             self.assertTrue(5 < resting < 2e5 and 5 < turning < 2e5 and 5 < cold < 1e6)
