@@ -256,8 +256,8 @@ class Bed:
         self.width = box_width(count)
         text, height = lattice(self.shape, count, self.width, seed)
         key = hashlib.sha1((text + (DECKS / "in.settle").read_text() + str(SETTLE)).encode()).hexdigest()[:10]
-        self.data = self.path / f"bed-{key}.data"
-        if not self.data.exists():
+        data = self.path / f"bed-{key}.data"
+        if not data.exists():
             print(f"settling {count} x {shape_name} ..", flush=True)
             (self.path / "lattice.data").write_text(text)
             fresh = self.path / "fresh.data"
@@ -265,9 +265,9 @@ class Bed:
                                           "width": self.width, "height": height, "steps": SETTLE,
                                           "tolerance": 1e-6, "n": count})
             (self.path / "settle.log").write_text(run.log)
-            fresh.rename(self.data)
+            fresh.rename(data)
         self.key = key
-        self.rows = sections(self.data.read_text())
+        self.rows = sections(data.read_text())
 
     def convert(self):
         """Writes nurbs.data, sphere.data, superquadric.data and turned, in a box up to the lid."""

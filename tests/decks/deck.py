@@ -194,12 +194,12 @@ def data_file(atoms, velocities=(), box=((-10, 10), (-10, 10), (-10, 10)), types
 
 def shape_file(kind, *sizes, **options):
     """Text of a shape file made by `nurbs-shape make KIND`: `sizes` are three semi-axes or one radius, `options` the rest."""
-    command = [str(BUILD / "nurbs-shape"), "make", kind]
+    arguments = ["make", kind]
     if sizes:
-        command += ["--axes" if len(sizes) == 3 else "--radius", ",".join(repr(float(size)) for size in sizes)]
+        arguments += ["--axes" if len(sizes) == 3 else "--radius", ",".join(repr(float(size)) for size in sizes)]
     for name, value in options.items():
-        command += [f"--{name}", str(value)]
+        arguments += [f"--{name}", value]
     with tempfile.TemporaryDirectory() as place:
         file = pathlib.Path(place) / "shape.json"
-        subprocess.run([*command, "-o", str(file)], check=True, stdout=subprocess.DEVNULL)
+        nurbs_shape(*arguments, "-o", file).check_returncode()
         return file.read_text()

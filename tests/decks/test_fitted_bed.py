@@ -2,7 +2,6 @@
 """Ten grains fitted by nurbs-shape, and a rounded polyhedron, settle in one bed: no contact stays unresolved; equal shape
 files share what they hold, and say the same whoever made them."""
 import pathlib
-import subprocess
 import sys
 import tempfile
 import unittest
@@ -13,7 +12,6 @@ sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent))
 import deck  # noqa: E402
 import meshes  # noqa: E402
 
-PROGRAM = str(deck.BUILD / "nurbs-shape")
 PRIMES = (15485863, 15485867, 15485917, 15485927, 15485933, 15485941, 15485959, 15485989, 15485993, 15486013, 15486041)
 
 DECK = """
@@ -54,11 +52,10 @@ def make_shapes(place, count):
         mesh = place / "mesh.stl"
         mesh.write_bytes(meshes.binary_stl(points, faces))
         files.append(f"g{seed}.json")
-        subprocess.run([PROGRAM, "fit", mesh, "--tolerance", "6%", "-o", place / files[-1]], check=True,
-                       stdout=subprocess.DEVNULL)
+        deck.nurbs_shape("fit", mesh, "--tolerance", "6%", "-o", place / files[-1]).check_returncode()
     files.append("crystal.json")
-    subprocess.run([PROGRAM, "make", "rounded-polyhedron", "--solid", "octahedron", "--radius", "1.2", "--rounding", "0.2",
-                    "-o", place / files[-1]], check=True, stdout=subprocess.DEVNULL)
+    deck.nurbs_shape("make", "rounded-polyhedron", "--solid", "octahedron", "--radius", "1.2", "--rounding", "0.2",
+                     "-o", place / files[-1]).check_returncode()
     return {name: (place / name).read_text() for name in files}
 
 

@@ -8,6 +8,7 @@ import numpy as np
 
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent))
 import deck
+import meshes
 
 SHAPES = {"pebble.json": deck.ROOT / "examples/shapes/pebble.json", "tablet.json": deck.ROOT / "examples/shapes/tablet.json",
           "box.json": deck.box_shape(0.5, 0.6, 0.7), "blocky.json": deck.ROOT / "examples/shapes/blocky.json"}
@@ -20,16 +21,9 @@ COLUMNS = {"": (1, 0, 0), "v": (1, 0, -1), "omega": (0, 0, -1), "f": (1, 1, -2),
 def hills(length):
     """STL text of a floor of 32 triangles that is not flat."""
     at = np.linspace(-4, 4, 5)
-    points = np.array([[(x, y, 0.125 * ((3 * i + j) % 4)) for j, y in enumerate(at)] for i, x in enumerate(at)]) * length
-    lines = ["solid hills"]
-    for i in range(4):
-        for j in range(4):
-            a, b, c, d = points[i, j], points[i + 1, j], points[i + 1, j + 1], points[i, j + 1]
-            for face in ((a, b, c), (a, c, d)):
-                lines += ["facet normal 0 0 1", "outer loop"]
-                lines += ["vertex {!r} {!r} {!r}".format(*map(float, point)) for point in face]
-                lines += ["endloop", "endfacet"]
-    return "\n".join(lines + ["endsolid hills"]) + "\n"
+    points = np.array([(x, y, 0.125 * ((3 * i + j) % 4)) for i, x in enumerate(at) for j, y in enumerate(at)]) * length
+    corners = [(5 * i + j, 5 * i + j + 5, 5 * i + j + 6, 5 * i + j + 1) for i in range(4) for j in range(4)]
+    return meshes.ascii_stl(points, [face for a, b, c, d in corners for face in ((a, b, c), (a, c, d))])
 
 
 def scene(law, floor, length=1.0, mass=1.0, time=1.0, units="si", ranks=1):
