@@ -38,8 +38,10 @@ constexpr double kRaised = 2;          // largest gain of a degree: rungs that n
 constexpr double kCurvatureShare = 3;  // least curvature over the tolerance, both relative
 constexpr double kLeastCurvature = 0.002, kMostCurvature = 0.1;
 constexpr double kGaugeCurvatures[] = {10, 3, 1};  // over the tolerance: the first that can be had
-constexpr double kGaugeGain = 1.4;                 // largest fall of the error by asking for less curvature
-constexpr int kFurther = 2;  // rungs tried beyond a body that is near enough, but not proven convex
+// Least height of a cap of curvature 1 over a triangle of area 1: the squared radius of its circle, halved.
+const double kTriangleBulge = 2 / (3 * std::sqrt(3.0));
+constexpr double kGaugeGain = 1.4;  // largest fall of the error by asking for less curvature
+constexpr int kFurther = 2;         // rungs tried beyond a body that is near enough, but not proven convex
 constexpr double kSurelyTooCoarse = 3;  // times the tolerance: no freer fit is tried
 // A fit that aims at far less than it can reach weighs distances so heavily that it loses convexity: the aim
 // falls from kFirstAim (of the radius) with what has been reached.
@@ -577,9 +579,9 @@ class HullFitter {
     GaugeFitOptions options = gauge_options();
     for (double share : kGaugeCurvatures) {
       options.least_curvature = std::clamp(share * tolerance_ / radius_, kLeastCurvature, kMostCurvature);
-      // A face must bulge by less than the tolerance.
-      if (share > kGaugeCurvatures[2] && 0.5 * options.least_curvature * face_area_ > tolerance_ / radius_)
-        continue;
+      // A face bulges by no more than from its corners, as low as they may be, to as high as it may be.
+      const double bulge = kTriangleBulge * options.least_curvature * face_area_;
+      if (share > kGaugeCurvatures[2] && bulge > 2 * tolerance_ / radius_) continue;
       for (int pass = 0; pass < 2; ++pass) {  // what certifies further away is asked to be nearer
         GaugeFit fit = fit_gauge(degree, spans, even, options);
         gauge_error_ = fit.error * kAim * tolerance_;

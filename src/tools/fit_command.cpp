@@ -273,25 +273,19 @@ void simplify(const FitArguments& a) {
 }
 
 constexpr char kFitNotes[] =
-    "The mesh must be closed; points may be doubled, triangles wound either way. The body is a smooth convex "
-    "one\n"
-    "near the mesh's convex hull: the simplest of a sphere and six bicubic or biquartic patches, polynomial "
-    "of "
-    "1 to 4\n"
-    "spans, rational of 4, 6, 8, 10, 12, whose largest distance from the hull, either way, is proven to be "
-    "within the tolerance, a share "
-    "of the\n"
-    "hull's largest radius about its centre of mass, and which is proven convex where one is; its flattest "
-    "places bulge\n"
-    "by what the tolerance leaves, which keeps contacts cheap. Cylinders, cones and others of revolution "
-    "with "
-    "few edges,\n"
-    "and polyhedra of up to 60 faces, keep their flat faces and get edges as round as the tolerance allows. "
-    "Other bodies\n"
-    "with sharp edges want many points: take them from `make` or `import`.\n"
-    "It lies where the mesh does; from so far away that its coordinates would lose digits it is moved to the "
-    "origin,\n"
-    "by what is printed.\n"
+    "The mesh must be closed; points may be doubled, triangles wound either way. The body is a smooth "
+    "convex\n"
+    "one near the mesh's convex hull: the simplest of a sphere and six bicubic or biquartic patches,\n"
+    "polynomial of 1 to 4 spans, rational of 4, 6, 8, 10, 12, whose largest distance from the hull, either\n"
+    "way, is proven to be within the tolerance, a share of the hull's largest radius about its centre of\n"
+    "mass, and which is proven convex where one is; its flattest places bulge by what the tolerance leaves,\n"
+    "which keeps contacts cheap. Cylinders, cones and others of revolution with few edges, and polyhedra of\n"
+    "up to 60 faces (300 where nothing else is near enough) keep their flat faces and get edges as round as\n"
+    "the tolerance allows; edges that are round already keep their radius. Other bodies with sharp edges\n"
+    "want many points: take them from `make` or `import`.\n"
+    "It lies where the mesh does; from so far away that its coordinates would lose digits it is moved to "
+    "the\n"
+    "origin, by what is printed.\n"
     "Example: nurbs-shape fit grain.stl --tolerance 2% -o grain.json\n";
 
 }  // namespace

@@ -297,10 +297,39 @@ class Fit(unittest.TestCase):
                     volume = float(re.search(r"against the mesh: volume ([-+]\S+) %", said)[1])
                     self.assertLess(abs(volume), 100 * tolerance)
 
-    def test_sharp_edges_of_no_kind_are_given_up(self):
-        """Half a cylinder is neither of revolution nor of a few faces; the error says where such bodies come from."""
+    def test_round_edges_are_seen(self):
+        """A rounded box as triangles becomes one again, of its own radius."""
+        box = self.place / "box.json"
+        for rounding in (0.05, 0.1):
+            call("make", "rounded-box", "--axes", "1,0.8,0.6", "--rounding", str(rounding), "-o", box).check_returncode()
+            call("export", box, "-o", self.place / "box.stl").check_returncode()
+            for tolerance in (0.02, 0.01):
+                with self.subTest(rounding=rounding, tolerance=tolerance):
+                    said = call("fit", self.place / "box.stl", "--tolerance", str(tolerance), "-o", self.out)
+                    self.assertEqual(said.returncode, 0, said.stderr)
+                    self.assertIn("polyhedron of 6 faces with rounded edges; 54 patches", said.stdout)
+                    self.assertAlmostEqual(float(re.search(r"; curvature radius (\S+) to", said.stdout)[1]) / rounding, 1, 1)
+                    self.assert_near(sample(box, 12)[0], 0.003)
+
+    def test_many_faces_at_last(self):
+        """Half a cylinder is neither of revolution nor of a few faces: a polyhedron, as nothing else is near enough."""
         points, faces = meshes.prism(128)
         points[:, 1] = np.maximum(points[:, 1], 0)
+        said = self.fit(points, faces, "--tolerance", "0.5%")
+        self.assertIn("polyhedron of 67 faces with rounded edges", said)
+        bounds = [float(x) for x in re.search(r"distance from the hull: (\S+) % outward, (\S+) % inward", said).groups()]
+        self.assertLess(max(bounds), 0.5)
+        outward, inward = support_difference(self.out, points, 8)
+        self.assertLess(max(outward, -inward), 0.005 * np.linalg.norm(points - (0, 0.4, 0), axis=1).max())
+        check = call("check", self.out)
+        self.assertIn("closed, outward, convex", check.stdout)
+        self.assertEqual((check.returncode, check.stderr), (0, ""))
+
+    def test_sharp_edges_of_no_kind_are_given_up(self):
+        """A cut ellipsoid is neither of revolution nor of faces; the error says where such bodies come from."""
+        points, faces = meshes.icosphere(3)
+        points = points * (1, 0.8, 0.6)
+        points[:, 1] = np.maximum(points[:, 1], 0.1)
         mesh = self.mesh(meshes.binary_stl(points, faces))
         self.assert_one_error(call("fit", mesh, "--tolerance", "0.5%", "-o", self.out), "take them from `make` or `import`")
 
