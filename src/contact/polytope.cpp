@@ -160,6 +160,7 @@ class Search {
     settle(best_);
     double last = kFarAway, near_before = -kFarAway;
     std::array<short, 3> asked = {-1, -1, -1};
+    Vec3 asked_along = Vec3::Zero();
     for (int idle = 0; hull_.points() < most; ++idle) {
       const int near = best_face();
       if (near < 0 || upper_ - lower_ <= tolerance_ || lower_ > enough) return;
@@ -167,11 +168,13 @@ class Search {
       last = upper_ - lower_;
       near_before = std::max(near_, near_before);
       const std::array<short, 3> corners = hull_.face(near).vertex;
-      if (idle > kMostIdle || corners == asked) {  // a face that outlives its own support never goes
+      // A face that outlives its own support never goes, unless its edge was asked and the other face went.
+      if (idle > kMostIdle || (corners == asked && direction_to_ask_ == asked_along)) {
         stalled_ = true;
         return;
       }
       asked = corners;
+      asked_along = direction_to_ask_;
       if (lower_caps_) {
         lower_caps();
         continue;
