@@ -10,22 +10,27 @@
 namespace nurbs {
 namespace {
 
-// Radius, lab lengths, of a ball that touches at a support point along `along` (shape axes) from inside; 0
-// where that is not the surface's normal.
-double ball(const PairFrame& pair, const Shape& shape, const Support& at, double scale, const Vec3& along) {
+// A ball that touches at a point from inside, lab lengths; `normal` outward there.
+struct Ball {
+  double radius;  // 0: none is known
+  Vec3 normal;
+};
+
+// At a support point along `along` (shape axes); none where that is not the surface's normal.
+Ball ball(const PairFrame& pair, const Shape& shape, const Support& at, double scale, const Vec3& along) {
   const bool met = (at.normal - along).squaredNorm() <= kStationary * kStationary;
-  return met ? std::min(scale * rolling_radii(shape, at.where, at.normal).inner, pair.reach) : 0;
+  return {met ? std::min(scale * rolling_radii(shape, at.where, at.normal).inner, pair.reach) : 0, at.normal};
 }
 
-// The bracket at points p.a, p.b of the hulls whose supports along d are at most `upper` = p(d), with such
-// balls there.
-Bracket bracket_along(const PairFrame& pair, const Vec3& d, double upper, const PointPair& p, double rho_a,
-                      double rho_b) {
-  const Vec3 core = (p.b + rho_b * d) - (p.a - rho_a * d);
+// The bracket at points p.a, p.b of the hulls whose supports along d are at most `upper` = p(d), with balls
+// there whose normals are in their shapes' axes.
+Bracket bracket_along(const PairFrame& pair, const Vec3& d, double upper, const PointPair& p, const Ball& a,
+                      const Ball& b) {
+  const Vec3 core = (p.b - b.radius * (pair.turn * b.normal)) - (p.a - a.radius * a.normal);
   const double slack = pair.scale_a * pair.a->joint_slack + pair.scale_b * pair.b->joint_slack;
-  const double most =
-      core.dot(d) > 0 ? core.norm() - rho_a - rho_b + slack + kRoundoff * pair.reach : kFarAway;
-  return {-upper, most, d, 0, rho_a + rho_b};
+  const double unique = a.radius + b.radius;
+  const double most = core.dot(d) > 0 ? core.norm() - unique + slack + kRoundoff * pair.reach : kFarAway;
+  return {-upper, most, d, 0, unique};
 }
 
 // W of a body at a support point, in the basis t, s of the pair frame.
@@ -156,10 +161,13 @@ bool meet_bridge(const PairFrame& pair, const Vec3& direction, double tolerance,
       const auto ball_at = [&](const Support& of, bool on_a) {
         return on_a ? ball(pair, *pair.a, of, pair.scale_a, d) : ball(pair, *pair.b, of, pair.scale_b, on_b);
       };
-      const double rho_two = std::min(ball_at(at.two[0], at.of_a), ball_at(at.two[1], at.of_a)),
-                   rho_one = ball_at(at.one, !at.of_a);
+      // Between two balls of one radius rolls a third.
+      const Ball two[2] = {ball_at(at.two[0], at.of_a), ball_at(at.two[1], at.of_a)};
+      const Ball between{std::min(two[0].radius, two[1].radius),
+                         next * two[0].normal + (1 - next) * two[1].normal},
+          other = ball_at(at.one, !at.of_a);
       const Bracket bracket =
-          bracket_along(pair, d, upper, points, at.of_a ? rho_two : rho_one, at.of_a ? rho_one : rho_two);
+          bracket_along(pair, d, upper, points, at.of_a ? between : other, at.of_a ? other : between);
       if (!(bracket.width() <= tolerance)) return false;
       s->set_met(points, bracket, k + 1);
       return true;
