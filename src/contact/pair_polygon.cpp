@@ -11,9 +11,11 @@ using namespace polygon;
 constexpr double kFaceCosine = 0.5;  // a face further than 60 degrees from the contact's normal is not asked
 constexpr double kOtherFaceCosine = 0.3;  // nor may one further than 72 degrees soon be
 constexpr double kLineAngle = 0.8;        // rad, the same for the normal of a ruled line
-constexpr double kPairShare = 0.5;        // as kWayShare, where the overlap's growth counts by itself
-constexpr double kMostAcross = 0.1;       // rad: one step of the search for the least overlap across lines
-constexpr int kAcrossSteps = 12;          // of them; 2 to 3 are usual
+// A face's normal is the contact's to 8 degrees, or its overlap along that is hardly more than the least.
+constexpr double kSameWay = 0.99, kOtherWay = 1.1;
+constexpr double kPairShare = 0.5;   // as kWayShare, where the overlap's growth counts by itself
+constexpr double kMostAcross = 0.1;  // rad: one step of the search for the least overlap across lines
+constexpr int kAcrossSteps = 12;     // of them; 2 to 3 are usual
 
 // How far a pair may go before `d`, which a body's support point is along, may come square to a ruled line:
 // before that no such line supports the body. Relative turns are ways, at the smaller radius at least; of
@@ -474,8 +476,14 @@ bool make_pair_polygon(const Particle& pa, const Particle& pb, const Vec3& norma
   if (!(depth[first] <= most) || depth[1 - first] < depth[first] - kReferenceShare * overlap)
     first = 1 - first;
 
+  const double other_way = old ? 0 : kOtherWay * overlap;
+  const auto may_serve = [&](int k) {
+    return depth[k] <= other_way ||
+           (depth[k] <= most &&
+            (k == 0 ? a : b).shape->flats.faces[nearest[k]].normal.dot(towards[k]) >= kSameWay);
+  };
   const auto attempt = [&](int reference, ContactPolygon* polygon, bool* swallowed) {
-    return depth[reference] <= most &&
+    return nearest[reference] >= 0 && may_serve(reference) &&
            contact(reference, nearest[reference]).make(overlap, reach, polygon, swallowed);
   };
   bool swallowed = false;

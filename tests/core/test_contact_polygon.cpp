@@ -581,6 +581,46 @@ TEST(PairPolygon, where_there_is_none_there_is_none_on_the_clear_way) {
   EXPECT_GT(facing, 2000);
 }
 
+// Boxes that cross at their edges, deep: a face's normal far from the contact's is another contact's. Such
+// polygons, made one step and left the next, put energy into shaken boxes.
+TEST(PairPolygon, keeps_to_the_contacts_normal) {
+  const ShapePointer box = cuboid();
+  const ContactSettings settings;
+  constexpr double kEightDegrees = 0.9898;
+  Random random(22);
+  int made = 0, remade = 0;
+  for (int n = 0; n < 4000; ++n) {
+    Particle a, b;
+    a.shape = b.shape = box.get();
+    a.q = random.turn();
+    b.q = about(random.direction(), random.log_uniform(1e-3, 0.3)) * a.q;  // edges nearly parallel
+    b.x = 3 * box->bounding_radius * random.direction();
+    const double overlap = random.uniform(0.002, 0.03) * box->bounding_radius;
+    ContactResult r;
+    for (int k = 0; k < 20 && std::abs(r.gap + overlap) > 0.1 * overlap; ++k) {
+      double memory[kPairMemorySize] = {};
+      r = find_contact(a, b, settings, memory);
+      b.x -= (r.gap + overlap) * r.normal;
+    }
+    if (!(r.gap < 0)) continue;
+    ContactPolygon polygon, next;
+    if (!make_pair_polygon(a, b, r.normal, -r.gap, -kReach * r.gap, nullptr, &polygon)) continue;
+    ++made;
+    PolygonState state = evaluate(polygon, body_frame(a), body_frame(b));
+    const double deepest = support_gap(polygon, &a, b, Vec3::Zero());
+    EXPECT_TRUE(state.normal.dot(r.normal) > kEightDegrees || deepest > 1.11 * r.gap) << n;
+    move(random, 0.01 * box->bounding_radius, &b);
+    state = evaluate(polygon, body_frame(a), body_frame(b));
+    const double now = std::max(-state.least, -support_gap(polygon, &a, b, Vec3::Zero()));
+    if (!(now > 0) || !make_pair_polygon(a, b, state.normal, now, kKeptReach * now, &polygon, &next))
+      continue;
+    ++remade;
+    EXPECT_GT(evaluate(next, body_frame(a), body_frame(b)).normal.dot(state.normal), kEightDegrees) << n;
+  }
+  EXPECT_GT(made, 500);
+  EXPECT_GT(remade, 300);
+}
+
 // Poses a little into the plane z = 0 that `polygon_of(particle, reach, &clear)` finds none for are moved by
 // nearly the way it calls clear, as far as there is one; how many moved ones there were to ask.
 template <class PolygonOf>
