@@ -243,9 +243,10 @@ unsigned follow_joints(unsigned asked, double enough, JointLanes* pairs) {
                            (bracket.angle2 * pairs->size <= larger<Wide>(tolerance, kRoundoff * pairs->size));
 
     // The step spent on a second-order update of points and normal.
-    const V normal =
-        normalized(turned_normal(a.normal, a.at, bend_a, step.metric_a, step.au, step.av) +
-                   turned_normal(V{} - b.normal, b.at, bend_b, first_b.inverse(), step.bu, step.bv));
+    const V of_a = turned_normal(a.normal, a.at, bend_a, step.metric_a, step.au, step.av),
+            of_b = turned_normal(V{} - b.normal, b.at, bend_b, first_b.inverse(), step.bu, step.bv);
+    const Wide turn_a = norm2(of_a - a.normal) + kNoTurn, turn_b = norm2(of_b + b.normal) + kNoTurn;
+    const V normal = normalized(turn_b * of_a + turn_a * of_b);
     const V at_a = taylor(a.at, step.au, step.av), at_b = taylor(b.at, step.bu, step.bv);
     const Wide noise = kRoundoff * pairs->reach;
     const WideMask nearer =

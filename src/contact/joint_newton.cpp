@@ -154,10 +154,12 @@ NURBS_INLINE bool refine(const PairFrame& pair, JointSolution& s, const Forms& a
   PointPair& p = s.points;
   if (!turns_linearly(s.jet_a, steps.a) || !turns_linearly(s.jet_b, steps.b) || b.first.singular())
     return false;
-  // b.second was taken along A's normal, which is -n_B here up to second order.
-  const Vec3 normal =
-      (turned_normal(p.na, a, steps.metric, steps.a) + turned_normal(-p.nb, b, b.first.inverse(), steps.b))
-          .normalized();
+  // b.second was taken along A's normal, which is -n_B here up to second order. The normal that turned less
+  // is known better: a flat's, or that of much the larger body.
+  const Vec3 of_a = turned_normal(p.na, a, steps.metric, steps.a),
+             of_b = turned_normal(-p.nb, b, b.first.inverse(), steps.b);
+  const double turn_a = (of_a - p.na).squaredNorm() + kNoTurn, turn_b = (of_b + p.nb).squaredNorm() + kNoTurn;
+  const Vec3 normal = (turn_b * of_a + turn_a * of_b).normalized();
   const Vec3 at_a = taylor(s.jet_a, steps.a[0], steps.a[1]), at_b = taylor(s.jet_b, steps.b[0], steps.b[1]);
   const double noise = kRoundoff * pair.reach;
   if (!(misfit2(normal, at_b - at_a) <= misfit2(p.na, p.b - p.a) + noise * noise)) return false;
