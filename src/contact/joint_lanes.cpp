@@ -250,7 +250,7 @@ unsigned follow_joints(unsigned asked, double enough, JointLanes* pairs) {
     const V at_a = taylor(a.at, step.au, step.av), at_b = taylor(b.at, step.bu, step.bv);
     const Wide noise = kRoundoff * pairs->reach;
     const WideMask nearer =
-        misfit2(normal, at_b - at_a) <= misfit2(a.normal, b.at.s - a.at.s) + noise * noise;
+        misfit2(normal, at_b - at_a) <= kNearer2 * misfit2(a.normal, b.at.s - a.at.s) + noise * noise;
     const WideMask done = usual & close & nearer & first_b.regular() &
                           turns_linearly(a.at, first_a, step.au, step.av) &
                           turns_linearly(b.at, first_b, step.bu, step.bv);

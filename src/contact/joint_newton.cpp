@@ -162,7 +162,7 @@ NURBS_INLINE bool refine(const PairFrame& pair, JointSolution& s, const Forms& a
   const Vec3 normal = (turn_b * of_a + turn_a * of_b).normalized();
   const Vec3 at_a = taylor(s.jet_a, steps.a[0], steps.a[1]), at_b = taylor(s.jet_b, steps.b[0], steps.b[1]);
   const double noise = kRoundoff * pair.reach;
-  if (!(misfit2(normal, at_b - at_a) <= misfit2(p.na, p.b - p.a) + noise * noise)) return false;
+  if (!(misfit2(normal, at_b - at_a) <= kNearer2 * misfit2(p.na, p.b - p.a) + noise * noise)) return false;
   p.a = at_a;
   p.b = at_b;
   p.na = normal;
