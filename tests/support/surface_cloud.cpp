@@ -13,7 +13,7 @@ constexpr int kPoints = 5000;  // about
 Vec3 ascend(const BezierPatch& patch, const Vec3& d, double u, double v) {
   Jet2 jet = evaluate2(patch, u, v);
   double h = d.dot(jet.s);
-  for (int iteration = 0; iteration < 40; ++iteration) {
+  for (int iteration = 0; iteration < 1000; ++iteration) {  // dents take hundreds
     Eigen::Vector2d g(d.dot(jet.su), d.dot(jet.sv));
     Eigen::Matrix2d m;
     m << d.dot(jet.suu), d.dot(jet.suv), d.dot(jet.suv), d.dot(jet.svv);
