@@ -153,6 +153,7 @@ double continuity_factor(double energy, const ContactPolygon& polygon, const Pol
 double relax(ContactPolygon& polygon, const PolygonState& state, double share) {
   const double before = stored_energy(polygon, state);
   polygon.factor += share * (1 - polygon.factor);
+  if (std::abs(1 - polygon.factor) < kRelaxed) polygon.factor = 1;
   return stored_energy(polygon, state) - before;
 }
 
