@@ -60,7 +60,7 @@ constexpr double kSlideShare = 1e-3;  // of the polygon's size that cut points m
 constexpr double kReferenceShare = 0.05;  // of the overlap by which the other face must be the shallower one
                                           // to become the reference
 constexpr double kOutgrownShare = 0.1;    // of the overlap by which the body may be deeper than its points
-constexpr double kRelaxed = 1e-8;          // of the factor: as good as 1
+constexpr double kRelaxed = 1e-8;         // of the factor: as good as 1
 constexpr double kClearTurn = 0.2;   // of the smaller bounding radius: what a contact's normal that turns
                                      // by 1 rad takes off its clear way
 constexpr double kClearGrowth = 2;   // what an overlap of two bodies that changes by 1 takes off it

@@ -101,6 +101,16 @@ void check_pair_style(LAMMPS* lmp, std::set<std::string>* told) {
   if (lmp->atom->natoms > 1) warn_once(lmp, told, missing + ": particles go through each other");
 }
 
+// Particles may be meant to stand still, all of them hardly ever.
+void warn_no_integrator(LAMMPS* lmp, std::set<std::string>* told) {
+  if (lmp->update->nsteps == 0) return;
+  for (int k = 0; k < lmp->modify->nfix; ++k) {
+    const Fix& fix = *lmp->modify->fix[k];
+    if (fix.time_integrate || std::strcmp(fix.style, "freeze") == 0) return;
+  }
+  warn_once(lmp, told, "No fix moves the particles: they stand still; 'fix ID all nve/nurbs' moves them");
+}
+
 void check_integrator(LAMMPS* lmp, const Fix& fix) {
   if (!fix.time_integrate || std::strcmp(fix.style, "nve/nurbs") == 0 || std::strcmp(fix.style, "move") == 0)
     return;
@@ -231,6 +241,7 @@ void check_host(LAMMPS* lmp, std::set<std::string>* told) {
   warn_default_step(lmp, told);
   check_pair_style(lmp, told);
   for (int k = 0; k < lmp->modify->nfix; ++k) check_fix(lmp, lmp->modify->fix[k], told);
+  warn_no_integrator(lmp, told);
   warn_lost_fixes(lmp, told);
 }
 

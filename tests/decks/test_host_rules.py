@@ -407,6 +407,14 @@ class Warned(unittest.TestCase):
         counted = text + "fix c all massflow/mesh mesh m count once vec_side 0 0 -1\nrun 1\n"
         self.assertNotIn("is no wall", "".join(self.warnings(counted, {"m.stl": mesh})))
 
+    def test_no_fix_moves_the_particles(self):
+        still = DECK.replace("fix motion all nve/nurbs\n", "")
+        for text, told in ((still + "run 2\nrun 2\n", 1), (still + "run 0\n", 0), (DECK + "run 2\n", 0),
+                           (still + "fix motion all freeze\nrun 2\n", 0),
+                           (still + "fix motion all move linear 0 0 1\nrun 2\n", 0)):
+            screen = deck.run_ok(text, files=files()).screen
+            self.assertEqual(screen.count("No fix moves the particles"), told, text)
+
     def test_frozen_particles_that_turn(self):
         """The host's fix freeze leaves them their speed and spin; stopped, they stand, whatever falls on them."""
         moving = [(1, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0), (2, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0), (3, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)]

@@ -2,6 +2,7 @@
 """The deck that the README prints runs as printed."""
 import re
 import sys
+import tempfile
 import unittest
 from pathlib import Path
 
@@ -23,10 +24,21 @@ class Readme(unittest.TestCase):
         self.assertEqual(result.thermo["Atoms"][-1], 36)
         self.assertLess(result.thermo["KinEng"][-1], 2e6)  # 7e7 J in free fall: the floor holds them
 
+    def test_its_ledger(self):
+        text = (deck.ROOT / "README.md").read_text()
+        lines = lambda name: re.findall(r"^    (.*)$", text.split(f"\n## {name}\n")[1].split("\n## ")[0], re.MULTILINE)  # noqa: E731
+        pebbles, ledger = lines("A deck"), lines("Styles")
+        self.assertEqual(len(ledger), 8)
+        short = [line for line in pebbles if not line.startswith(("dump", "run"))]
+        thermo = deck.run_ok("\n".join(short + ledger) + "\nrun 15000\n", files={"pebble.json": deck.shape_file("pebble")}).thermo
+        lost = sum(values for name, values in thermo.items() if name.startswith("ledger"))
+        self.assertGreater(lost[-1], 1e6)
+        self.assertLess(np.ptp(thermo["sum"]), 0.01 * lost[-1])
+
     def test_its_lines_from_a_deck_for_spheres(self):
         """All of them in one deck, with the materials, the meshes and the box that they speak of: grains pour, and rolling counts."""
         section = (deck.ROOT / "README.md").read_text().split("\n## From a deck for spheres\n")[1].split("\n## ")[0]
-        lines = re.findall(r"^    (.*)$", section, re.MULTILINE)
+        lines = re.findall(r"^    (.*)$", section.split("\nA whole deck")[0], re.MULTILINE)
         style = next(line for line in lines if line.startswith("atom_style"))
         start = f"""units si
 newton off
@@ -50,6 +62,24 @@ fix gravity all gravity 9.81 vector 0 0 -1
                              files={"grain.json": deck.shape_file("pebble"), "silo.stl": square(0.01, 0.005), "face.stl": square(0.02, 0.06)})
         self.assertEqual(re.findall(r"Fix wall/nurbs (\w+) has no rolling_friction", result.screen), ["wall", "tube"])
         self.assertGreater(result.thermo["Atoms"][-1], 100)
+
+    def test_its_whole_deck(self):
+        """Files made as it says; grains stay in the drum, which carries them up; the restart goes on, on another number of ranks."""
+        section = (deck.ROOT / "README.md").read_text().split("\n## From a deck for spheres\n")[1].split("\n## ")[0].split("\nA whole deck")[1]
+        lines = re.findall(r"^    (.*)$", section, re.MULTILINE)
+        with tempfile.TemporaryDirectory() as place:
+            for command in re.findall(r"`build/nurbs-shape ([^`]*)`", section.replace("\n", " ")):
+                deck.nurbs_shape(*command.split(), cwd=place).check_returncode()
+            files = {name: Path(place) / name for name in ("grain.json", "drum.stl")}
+            run = deck.run_ok("\n".join(lines) + "\n", files=files, ranks=2)
+            self.assertNotIn("WARNING", run.screen)
+            self.assertEqual([table["Atoms"][-1] for table in run.tables], [200, 200])
+            again = [line for line in lines if line.split()[0] in ("communicate", "neighbor", "neigh_modify", "timestep") or
+                     re.match(r"fix +(E|nu|e|mu|drum|wall|gravity|motion|turn) ", line)]
+            more = deck.run_ok("newton off\nread_restart drum.restart\n" + "\n".join(again) + "\nrun 1000\n",
+                               files={**files, "drum.restart": run.path / "drum.restart"})
+        self.assertNotIn("WARNING", more.screen.replace("WARNING: Restart file used different # of processors", ""))
+        self.assertEqual(more.thermo["Atoms"][-1], 200)
 
     def test_its_restart_recipe(self):
         """What the README says to repeat after read_restart, and no more, goes on to the last bit."""
