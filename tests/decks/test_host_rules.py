@@ -261,13 +261,14 @@ class BetweenRuns(unittest.TestCase):
     TWO = "group a id 1\ngroup b id 2\ndelete_atoms group a\ndelete_atoms group b\n"
 
     @staticmethod
-    def heap(between, law, ranks=1):
+    def heap(between, law, ranks=1, others=()):
         random, atoms = np.random.default_rng(3), []
         for k, number in enumerate((7, 3, 9, 4, 5, 11, 12, 6, 8, 10)):
             q = random.normal(size=4)
             atoms.append((number, 1, 1 + k % 2, 1.0, 1000.0, -1.0 + k % 3, 0.1 * (k % 4), 0.55 + 0.75 * (k // 3),
                           *map(float, q / np.linalg.norm(q))))
         atoms += [(1, 1, 2, 0.5, 1000.0, 5.0, 5.0, 6.0, 1.0, 0.0, 0.0, 0.0), (2, 1, 2, 0.5, 1000.0, -5.0, 5.0, 6.0, 1.0, 0.0, 0.0, 0.0)]
+        atoms += others
         text = HEAP.replace("LAW", law[0]).replace("COEFFICIENTS", law[1]).format(between=between)
         return deck.run_ok(text, ranks=ranks, files={
             "box.json": deck.box_shape(0.5, 0.4, 0.3), "ball.json": deck.shape_file("sphere", 0.4),
@@ -293,11 +294,12 @@ class BetweenRuns(unittest.TestCase):
 
     def test_a_number_used_again_has_no_past(self):
         """A new particle in the place of the one deleted, under its number or another."""
-        place = "".join(f"variable {x}9 equal {x}[12]\nvariable {x}0 equal ${{{x}9}}\n" for x in "xyz")
-        delete = "group a id 12\ndelete_atoms group a compress no\n"
+        place = "".join(f"variable {x}9 equal {x}[13]\nvariable {x}0 equal ${{{x}9}}\n" for x in "xyz")
+        delete = "group a id 13\ndelete_atoms group a compress no\n"
         other, new = "create_atoms 1 single 6 6 6 units box\n", "create_atoms 1 single ${x0} ${y0} ${z0} units box\n"
-        same, another = (self.heap(place + text, LINEAR) for text in (delete + new + other, other + delete + new))
-        self.assertEqual(same.dump("dump.txt")[-1][1]["id"][-2], 12)
+        sticks = [(13, 1, 1, 1.0, 1000.0, -5.0, -5.0, 0.3, 1.0, 0.0, 0.0, 0.0)]  # flat on the floor, on a slope of 17 degrees
+        same, another = (self.heap(place + text, LINEAR, others=sticks) for text in (delete + new + other, other + delete + new))
+        self.assertEqual(same.dump("dump.txt")[-1][1]["id"][-2], 13)
         self.assertGreater(same.tables[0]["e[2]"][-1], 1.01 * same.tables[1]["e[2]"][0])
         self.assertEqual(same.tables[1]["e[2]"][0], another.tables[1]["e[2]"][0])
 
