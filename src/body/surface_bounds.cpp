@@ -19,6 +19,7 @@ constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr int kLeastRadiusBudget = 4;
 // The same for the proof of convexity, where no hollow is seen: without it every support is doubted.
 constexpr int kConvexBudget = 6;
+constexpr double kPlaneTilt = 1e-6;     // rad: more of a tilt within a patch is no plane's round-off
 constexpr double kSurelyTurned = 1e-6;  // least over largest coefficient of a volume: far above round-off
 constexpr double kBent = 1e-3;          // over the bounding radius: a curvature worth it
 
@@ -71,24 +72,32 @@ std::optional<CellBounds> plane_bounds(const BezierPatch& patch, double size) {
   if (patch.degree_u != 1 || patch.degree_v != 1 || patch.rational) return std::nullopt;
   const auto corner = [&](int i, int j) { return Vec3(patch.point(i, j).head<3>()); };
   const Vec3 a = corner(0, 0), b = corner(0, 1), c = corner(1, 0), d = corner(1, 1);
-  const Vec3 twice = (d - a).cross(b - c);  // as long as twice the area
+  const Vec3 twice = 0.5 * ((c - a) + (d - b)).cross((b - a) + (d - c));  // as long as twice the area
   const double area = twice.norm();
   if (!(area > 0)) return std::nullopt;
   const Vec3 n = twice / area;
-  for (const Vec3& p : {b, c, d})
-    if (!(std::abs(n.dot(p - a)) <= kNoDent * size)) return std::nullopt;
+  double off = 0;
+  for (const Vec3& p : {b, c, d}) off = std::max(off, std::abs(n.dot(p - a)));
+  if (!(off <= kNoDent * size)) return std::nullopt;
   // x_u x x_v is bilinear here: positive where it is so at the corners.
   const double jacobian[4] = {n.dot((c - a).cross(b - a)), n.dot((d - b).cross(b - a)),
                               n.dot((c - a).cross(d - c)), n.dot((d - b).cross(d - c))};
   const double least = *std::min_element(jacobian, jacobian + 4);
   if (!(least >= -kNoDent * area)) return std::nullopt;
+  // Corners where it vanishes are those of a collapsed edge, towards which the tangents do so too.
+  double sure = area;
+  for (const double j : jacobian)
+    if (j > kNoDent * area) sure = std::min(sure, j);
+  const double du = std::max((c - a).norm(), (d - b).norm()), dv = std::max((b - a).norm(), (d - c).norm());
+  // Off the plane a tangent goes 2 off at most, and x_uv 4 off: of a needle that is much of an angle.
+  const double tilt = 2 * off * (du + dv) / sure;
+  if (!(tilt < kPlaneTilt && 4 * off * size <= kCurvatureNoise * sure)) return std::nullopt;
   CellBounds out;
   out.regular = true;
   out.axis = n;
-  out.cone = kNoDent;
+  out.cone = kNoDent + tilt;
   out.min_radius = size / kCurvatureNoise;
   out.max_radius = out.rate = kInfinity;
-  const double du = std::max((c - a).norm(), (d - b).norm()), dv = std::max((b - a).norm(), (d - c).norm());
   out.speed_u = dv > 0 ? std::max(least, 0.0) / dv : 0;
   out.speed_v = du > 0 ? std::max(least, 0.0) / du : 0;
   return out;
@@ -340,7 +349,7 @@ class Bounder {
     }
     for (int p = 0; p < patches_; ++p) {
       if (const auto plane = plane_bounds(out_.even[p], shape_.bounding_radius)) {
-        open_.push_back({{whole_patch(out_.even, p), *plane, {}}, 0});
+        open_.push_back({{whole_patch(out_.even, p), *plane, {}}, kDeepestCell});  // nothing is left to find
         ++out_.cells;
         continue;
       }

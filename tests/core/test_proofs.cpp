@@ -13,9 +13,11 @@
 #include "body/proofs.h"
 #include "body/shape.h"
 #include "body/support.h"
+#include "body/surface_bounds.h"
 #include "contact/pair_search.h"
 #include "io/pair_case.h"
 #include "io/shape_file.h"
+#include "nurbs/affine.h"
 #include "nurbs/tolerances.h"
 #include "shapes/primitives.h"
 #include "shapes/revolved.h"
@@ -112,6 +114,40 @@ TEST(Enclosure, holds_at_every_point_of_every_cell) {
       }
       expect_encloses(*shape, patch, cell, random);
     }
+}
+
+// Sides of plates are needles: what is nothing of the body's size is an angle there.
+TEST(Enclosure, of_needles_that_are_not_quite_plane) {
+  Random random(8);
+  int planes = 0;
+  for (int trial = 0; trial < 200; ++trial) {
+    const Vec3 half(1, random.uniform(0.3, 1), random.log_uniform(1e-5, 1));
+    Surfaces body = box(half);
+    transform(body, random.turn().toRotationMatrix(), Vec3::Zero());
+    const Vec3 corner = body[0].point(0, 0).head<3>(),
+               off = random.log_uniform(1e-16, 1e-13) * random.direction();
+    for (NurbsSurface& s : body)
+      for (int i = 0; i < s.size_u; ++i)
+        for (int j = 0; j < s.size_v; ++j)
+          if ((s.point(i, j).head<3>() - corner).norm() < 1e-9) s.point(i, j).head<3>() += off;
+    const auto shape = make_shape("plate", body);
+    using Long = Eigen::Matrix<long double, 3, 1>;
+    for (const Leaf& leaf : bound_surface(*shape).leaves) {
+      if (!leaf.bounds.regular) continue;
+      const BezierPatch& patch = shape->patches[leaf.cell.patch];
+      const auto at = [&](int i, int j) -> Long { return patch.point(i, j).head<3>().cast<long double>(); };
+      planes += leaf.cell.du == 1 && leaf.cell.dv == 1;
+      const Long axis = leaf.bounds.axis.cast<long double>().normalized();
+      for (int k = 0; k < 8; ++k) {
+        const long double u = leaf.cell.u0 + leaf.cell.du * (k % 2),
+                          v = leaf.cell.v0 + leaf.cell.dv * (k / 2 % 2);
+        const Long su = (1 - v) * (at(1, 0) - at(0, 0)) + v * (at(1, 1) - at(0, 1)),
+                   sv = (1 - u) * (at(0, 1) - at(0, 0)) + u * (at(1, 1) - at(1, 0)), n = su.cross(sv);
+        EXPECT_LE(axis.cross(n).norm() / n.norm(), leaf.bounds.cone + 4e-16) << half.transpose();
+      }
+    }
+  }
+  EXPECT_GT(planes, 1000);
 }
 
 TEST(Enclosure, turned_polar_cells_are_the_same) {
