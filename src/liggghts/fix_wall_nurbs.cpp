@@ -58,6 +58,12 @@ FixWallNurbs::FixWallNurbs(LAMMPS* lmp, int narg, char** arg) : Fix(lmp, narg, a
   narg = parse_motion(narg, arg);
   parse_law(first, narg, arg);
   surface_ = nurbs::SurfaceWall(kind_);
+  // The host deletes a fix whose ID is given again, and leaves its place empty for the new one.
+  if (update->ntimestep > 0 && std::count(modify->fix, modify->fix + modify->nfix, nullptr) > 0)
+    nurbs_host::warn(FLERR, lmp,
+                     name_of(*this) +
+                         ": a wall of this ID was there; all its contacts begin anew, without their friction "
+                         "springs");
 
   scalar_flag = vector_flag = 1;
   size_vector = 6;
@@ -119,14 +125,9 @@ int FixWallNurbs::parse_mesh(int narg, char** arg) {
     if (dynamic_cast<FixMeshSurface*>(fix) == nullptr)
       fail_all(FLERR, lmp,
                "Fix wall/nurbs mesh: fix " + name + " is a " + fix->style + "; it must be a mesh/surface");
-    if (std::strcmp(fix->style, "mesh/surface/stress/servo") == 0)
-      fail_all(FLERR, lmp,
-               "Fix wall/nurbs mesh: fix " + name +
-                   " is a mesh/surface/stress/servo, which wants the contacts of fix wall/gran; use "
-                   "mesh/surface/stress and fix move/mesh");
     for (const Mesh& mesh : meshes_)
       if (mesh.id == name) fail_all(FLERR, lmp, "Fix wall/nurbs mesh: fix " + name + " is there twice");
-    meshes_.push_back({name, nullptr, nullptr, {}, {}});
+    meshes_.push_back({name, nullptr, nullptr, false, {}, {}});
   }
   if (meshes_.empty()) fail_all(FLERR, lmp, "Fix wall/nurbs mesh needs the ID of a fix mesh/surface");
   if (meshes_.size() > nurbs::SurfaceWall::kMostMeshes)
@@ -185,14 +186,30 @@ void FixWallNurbs::post_create() {
   for (Mesh& mesh : meshes_) {
     mesh.fix = dynamic_cast<FixMeshSurface*>(modify->find_fix_id(mesh.id.c_str()));
     mesh.list = mesh.fix->createOtherNeighList(igroup, id);
+    serve(mesh);
   }
 }
 
 void FixWallNurbs::pre_delete(bool unfixflag) {
   if (!unfixflag) return;
   for (Mesh& mesh : meshes_)
-    if (auto* fix = dynamic_cast<FixMeshSurface*>(modify->find_fix_id(mesh.id.c_str())))
+    if (auto* fix = dynamic_cast<FixMeshSurface*>(modify->find_fix_id(mesh.id.c_str()))) {
       fix->deleteOtherNeighList(id);
+      if (!mesh.serves) continue;
+      fix->deleteWallNeighList();
+      for (FixWallNurbs* wall : all(lmp))
+        for (Mesh& other : wall->meshes_)
+          if (wall != this && other.id == mesh.id) wall->serve(other);
+    }
+}
+
+// A servo stops the run unless its mesh has the list of a fix wall/gran, which it asks whether anything is
+// near. The wall that made it takes it away: the host can't bear that a fix goes that stands before the one
+// unfixed.
+void FixWallNurbs::serve(Mesh& mesh) {
+  if (std::strcmp(mesh.fix->style, "mesh/surface/stress/servo") != 0 || mesh.fix->hasNeighList()) return;
+  mesh.fix->createWallNeighList(igroup);
+  mesh.serves = true;
 }
 
 int FixWallNurbs::setmask() {

@@ -84,6 +84,7 @@ class FixWallNurbs : public Fix {
     std::string id;
     class FixMeshSurface* fix = nullptr;
     class FixNeighlistMesh* list = nullptr;
+    bool serves = false;        // this wall has made the list that a servo wants
     std::vector<int> ids;       // of the triangles
     std::vector<double> nodes;  // of the last step
   };
@@ -95,6 +96,7 @@ class FixWallNurbs : public Fix {
   int parse_motion(int narg, char** arg);
   void parse_law(int first, int narg, char** arg);
   nurbs::PairProof& proof(int i) const { return *reinterpret_cast<nurbs::PairProof*>(proofs_[i]); }
+  void serve(Mesh& mesh);
   void hand_in_neighbours();
   bool listed() const { return kind_ != Kind::plane || motion_.moves(); }  // contacts in lists by particle
   void place_surface();

@@ -4,7 +4,9 @@
 #include <mpi.h>
 
 #include <algorithm>
+#include <cctype>
 #include <cstring>
+#include <fstream>
 #include <iterator>
 #include <string>
 
@@ -15,6 +17,7 @@
 #include "fix_insert.h"
 #include "fix_mesh_surface.h"
 #include "fix_particledistribution_discrete.h"
+#include "fix_property_global.h"
 #include "force.h"
 #include "group.h"
 #include "lammps.h"
@@ -131,6 +134,25 @@ void check_insertion(LAMMPS* lmp, Fix* fix) {
   }
 }
 
+// Properties of pairs of types that the host takes at any value; below 0 a contact would drive what it is to
+// brake.
+void check_materials(LAMMPS* lmp, Fix* fix) {
+  auto* property = dynamic_cast<FixPropertyGlobal*>(fix);
+  if (property == nullptr) return;
+  const int types = lmp->atom->ntypes;
+  for (const char* name : {"coefficientFriction", "coefficientRollingFriction",
+                           "coefficientRollingViscousDamping", "kn", "kt", "gamman", "gammat"}) {
+    if (property->check_fix(name, "peratomtypepair", types, types, "atom_style nurbs", false) == nullptr)
+      continue;
+    for (int i = 0; i < types; ++i)
+      for (int j = i; j < types; ++j)
+        if (const double value = property->compute_array(i, j); !(value >= 0))
+          fail_all(FLERR, lmp,
+                   name_of(*fix) + ": " + name + " of types " + std::to_string(i + 1) + " " +
+                       std::to_string(j + 1) + " = " + show(value) + " must be >= 0");
+  }
+}
+
 // A mesh that is neither a wall nor a face that particles are inserted or counted at. What uses one for
 // contact or counting has the host make it a fix neighlist/mesh, named neighlist_USER_MESH.
 void warn_idle_mesh(LAMMPS* lmp, Fix* fix, std::set<std::string>* told) {
@@ -183,6 +205,7 @@ void check_fix(LAMMPS* lmp, Fix* fix, std::set<std::string>* told) {
   warn_frozen_motion(lmp, *fix, told);
   check_integrator(lmp, *fix);
   check_insertion(lmp, fix);
+  check_materials(lmp, fix);
 }
 
 // Fixes of a restart file that the input script doesn't name again by their IDs and styles; of meshes only
@@ -234,6 +257,32 @@ void refuse_fix(LAMMPS* lmp, const char* style) {
     if (starts_with(style, rule.prefix))
       fail_all(FLERR, lmp,
                std::string("Fix ") + style + " can't be used with atom_style nurbs" + rule.instead);
+}
+
+void check_stl(LAMMPS* lmp, const char* style, const char* id, const char* file) {
+  int cut = 0;
+  if (lmp->comm->me == 0) {
+    std::ifstream stream(file);
+    std::string line, last;
+    bool facets = false;
+    for (int count = 0; std::getline(stream, line); ++count) {
+      std::string word;  // of the line, in small letters, without blanks
+      for (const char c : line)
+        if (std::isspace(static_cast<unsigned char>(c)) == 0)
+          word += static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+      if (word.empty()) continue;
+      if (count == 0 && !starts_with(word.c_str(), "solid")) break;
+      if (starts_with(word.c_str(), "facet")) facets = true;
+      last = word;
+    }
+    // A binary file's header may begin with 'solid' too, but has no lines of facets.
+    cut = facets && !starts_with(last.c_str(), "endsolid");
+  }
+  MPI_Bcast(&cut, 1, MPI_INT, 0, lmp->world);
+  if (cut != 0)
+    fail_all(FLERR, lmp,
+             std::string("Fix ") + style + " " + id + ": STL file " + file +
+                 " does not end with endsolid; it must be whole");
 }
 
 void check_host(LAMMPS* lmp, std::set<std::string>* told) {

@@ -16,6 +16,10 @@ void check_host(LAMMPS* lmp, std::set<std::string>* told);
 bool is_refused_fix(const std::string& style);
 void refuse_fix(LAMMPS* lmp, const char* style);
 
+// Ends the run if this file is an STL text without its end: the host takes what there is for the whole mesh,
+// or crashes. For the fix of this style and ID. Collective.
+void check_stl(LAMMPS* lmp, const char* style, const char* id, const char* file);
+
 // Ends the run with the line for a pair style of the host's in the place of gran/nurbs. Collective.
 [[noreturn]] void refuse_pair_style(LAMMPS* lmp);
 

@@ -166,10 +166,11 @@ void PairGranNurbs::warn_of_sphere_values() {
   if (local == nullptr) return;
   if (local->offset_fn() >= 0 || local->offset_ft() >= 0 || local->offset_torquen() >= 0 ||
       local->offset_torquet() >= 0 || local->offset_area() >= 0 || local->offset_delta() >= 0)
-    nurbs_host::warn(
+    nurbs_host::warn_news(
         FLERR, lmp,
         "Compute pair/gran/local: contactArea, delta, *_normal and *_tangential take the particles for "
-        "their bounding spheres; compute nurbs/local has the contact's own");
+        "their bounding spheres; compute nurbs/local has the contact's own",
+        last_sphere_warning_);
 }
 
 void PairGranNurbs::require_all_laws() {

@@ -125,7 +125,7 @@ class PairGranNurbs : public PairGran {
   std::uint64_t fingerprint_ = 0;  // at the end of the last run, 0 before the first
   bool changed_ = false;
   bigint checked_particles_ = 0;  // when the time step was last checked
-  std::string last_warning_, last_deep_warning_;
+  std::string last_warning_, last_deep_warning_, last_sphere_warning_;
 };
 
 }  // namespace LAMMPS_NS

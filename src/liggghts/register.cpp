@@ -103,6 +103,20 @@ Fix* create_unless_refused(LAMMPS* lmp, int narg, char** arg) {
   return hosts_refused().at(style)(lmp, narg, arg);
 }
 
+FixMap& hosts_meshes() {
+  static FixMap creators;
+  return creators;
+}
+
+Fix* create_mesh(LAMMPS* lmp, int narg, char** arg) {
+  if (dynamic_cast<LAMMPS_NS::AtomVecNurbs*>(lmp->atom->avec) != nullptr)
+    for (int k = 3; k + 1 < narg; ++k)
+      if (std::strcmp(arg[k], "file") == 0) LAMMPS_NS::nurbs_host::check_stl(lmp, arg[2], arg[0], arg[k + 1]);
+  const auto own =
+      hosts_meshes().find(arg[2]);  // mesh/surface/stress and its like are modules of mesh/surface
+  return (own != hosts_meshes().end() ? own->second : hosts_meshes().at("mesh/surface"))(lmp, narg, arg);
+}
+
 // Adds the styles to this LAMMPS instance's maps. Doing it twice does no harm: the last writer wins.
 void register_styles(LAMMPS* lmp) {
   [[maybe_unused]] auto& pairs = *lmp->force->pair_map;
@@ -122,6 +136,9 @@ void register_styles(LAMMPS* lmp) {
     if (create != &create_unless_refused && LAMMPS_NS::nurbs_host::is_refused_fix(style)) {
       hosts_refused()[style] = create;
       create = &create_unless_refused;
+    } else if (create != &create_mesh && style.compare(0, 12, "mesh/surface") == 0) {
+      hosts_meshes()[style] = create;
+      create = &create_mesh;
     }
 #define COMPUTE_CLASS
 #define ComputeStyle(key, Class) computes[#key] = &create_compute<LAMMPS_NS::Class>;

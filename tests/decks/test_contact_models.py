@@ -500,6 +500,8 @@ class BadInput(unittest.TestCase):
             with self.subTest(name):
                 lines = [line for line in good.splitlines() if name + " " not in line]
                 self.expect("\n".join(lines) + "\n", files, name)
+        lines = [line.replace(line.split()[-1], "-0.5") if "coefficientFriction " in line else line for line in good.splitlines()]
+        self.expect("\n".join(lines) + "\n", files, "coefficientFriction of types 1 1 = -0.5", ">= 0")
         self.expect(good.replace("pair_coeff * *", "pair_coeff * * kn 1 kt 1 mu 0"), files, "fix property/global")
         self.expect(good.replace(" model hertz tangential history\npair", "\npair", 1), files, "Pair coeff * *", "kn KN")
 

@@ -488,6 +488,14 @@ class Warned(unittest.TestCase):
                 self.assertEqual(len(told), 0 if words is None else 1, told)
                 self.assertIn(words or "", "".join(told))
 
+    def test_wall_given_again(self):
+        """Under its ID, between runs, as when a deck changes its friction: its springs are gone, which is said."""
+        wall = f"fix floor all wall/nurbs plane 0 0 0 0 0 1 {COEFFICIENTS}\n"
+        for text, count in ((DECK + wall + "run 1\nrun 1\n", 0), (DECK + "run 1\n" + wall + "run 1\n", 1),
+                            (DECK + "run 1\nunfix floor\n" + wall + "run 1\n", 0)):
+            told = [line for line in self.warnings(text) if "Fix wall/nurbs floor: a wall of this ID was there" in line]
+            self.assertEqual(len(told), count)
+
     def test_wall_of_another_name_after_a_restart(self):
         run = deck.run_ok(DECK + "set group all z 0.2\nset atom 2 x 4 z 0.2\nrun 1\nwrite_restart a.restart\n", files=files())
         restart = {"a.restart": run.path / "a.restart"}

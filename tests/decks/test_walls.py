@@ -447,6 +447,52 @@ class MovingWalls(unittest.TestCase):
                 self.assertEqual(other.thermo["st[10]"][-1], 0)
 
 
+class Servo(unittest.TestCase):
+    """fix mesh/surface/stress/servo: LIGGGHTS's controller moves the mesh by the force that our contacts put on it."""
+    PLATE = sheet(3, 0.15, lambda x, y: 0.08)
+    CONTROL = ("fix m all mesh/surface/stress/servo file wall.stl type 1 com 0 0 0.08 ctrlPV force axis 0 0 -1 "
+               "target_val 20 vel_max 0.2 kp 0.2\nfix floor all wall/nurbs plane 0 0 0 0 0 1 " + LAW)
+    ATOMS = [(1 + k, 1, 1, 0.03, 2500.0, 0.08 * (k % 3) - 0.08, 0.08 * (k // 3) - 0.08, 0.037, 0.8, 0.3, -0.5, 0.2) for k in range(9)]
+
+    def press(self, **options):
+        at_rest = [(1 + k,) + (0.0,) * 6 for k in range(9)]
+        return run("mesh m", atoms=self.ATOMS, velocities=at_rest, mesh=self.PLATE, before=self.CONTROL, thermo="f_m[3] f_m[9] f_floor[3]",
+                   **{"steps": "run 120000", **options})
+
+    def test_presses_with_the_force_it_is_told(self):
+        """The floor carries it and the bodies' weight."""
+        whole = self.press()
+        force, way, floor = (whole.thermo[name] for name in ("m[3]", "m[9]", "floor[3]"))
+        weight = 9 * 2500 * 4 / 3 * np.pi * 1.2 * 0.8 * 0.03**3 * 9.81
+        self.assertAlmostEqual(force[-1] / 20, 1, delta=0.01)
+        self.assertAlmostEqual(floor[-1] / -(force[-1] + weight), 1, delta=0.02)
+        self.assertLess(way[-1], 0.05)
+        two = self.press(ranks=2)  # sums of forces over ranks differ by round-off, which collisions amplify
+        self.assertAlmostEqual(two.thermo["m[3]"][-1] / 20, 1, delta=0.01)
+        parts = self.press(steps="run 80000\nwrite_restart a.restart\nrun 40000")
+        self.assertEqual(last(parts), last(whole))
+        again = self.press(start="newton off\nread_restart a.restart\ncommunicate single vel yes\n", ranks=2, steps="run 40000",
+                           files={"a.restart": parts.path / "a.restart"})
+        np.testing.assert_allclose(again.thermo["m[3]"][-1], force[-1], rtol=0.02)  # the controller's sum of errors is not kept
+
+    def test_walls_come_and_go(self):
+        for one, other in (("w", "w2"), ("w2", "w")):
+            self.press(after="fix w2 all wall/nurbs mesh m " + LAW, steps="run 100\nthermo_style custom step\n"
+                       f"unfix {one}\nrun 100\nunfix {other}\nunfix m\nrun 100")
+
+
+class CutShort(unittest.TestCase):
+    def test_an_stl_file_without_its_end(self):
+        """LIGGGHTS takes the triangles that there are for the mesh, or crashes."""
+        whole = stl(sheet(2, 0.1))
+        ends = {whole: 0, whole.replace("endsolid wall", "  EndSolid"): 0, whole.replace("endsolid wall\n", ""): 1, whole[:500]: 1, whole[:-40]: 1}
+        for text, count in ends.items():
+            for ranks in (1, 2) if text == whole[:-40] else (1, ):
+                result = run("mesh m", before=MESH, files={"wall.stl": text}, steps="run 0", ranks=ranks, fails=True)
+                self.assertEqual(len([line for line in result.errors if "STL file wall.stl does not end with endsolid" in line]), count)
+                self.assertEqual(result.status != 0, count > 0)
+
+
 class Cylinders(unittest.TestCase):
 
     def test_ball_inside_and_outside(self):
@@ -592,9 +638,6 @@ class BadInput(unittest.TestCase):
         self.assert_error("there is no fix nope", "mesh nope", **floor)
         self.assert_error("fix g is a gravity", "mesh g", **floor)
         self.assert_error("fix m is there twice", "mesh m m", **floor)
-        self.assert_error("use mesh/surface/stress and fix move/mesh", "mesh m", mesh=sheet(2, 0.1),
-                          before="fix m all mesh/surface/stress/servo file wall.stl type 1 com 0 0 0 ctrlPV force axis 0 0 -1 "
-                          "target_val 5 vel_max 0.2 kp 5")
         self.assert_error("meshes have fix move/mesh", "mesh m", law=LAW + " move linear 1 0 0", **floor)
         self.assert_error("must be plane, cylinder or mesh", "ball 1 2 3")
         self.assert_error("axis q must be x, y or z", "cylinder q 1 0 0")
