@@ -104,13 +104,26 @@ void check_pair_style(LAMMPS* lmp, std::set<std::string>* told) {
   if (lmp->atom->natoms > 1) warn_once(lmp, told, missing + ": particles go through each other");
 }
 
-// Particles may be meant to stand still, all of them hardly ever.
+// Particles may be meant to stand still, all of them hardly ever. Those that are still to be inserted may be
+// all that a fix is for.
 void warn_no_integrator(LAMMPS* lmp, std::set<std::string>* told) {
   if (lmp->update->nsteps == 0) return;
+  int moved = 0, frozen = 0;
+  bool inserts = false;
   for (int k = 0; k < lmp->modify->nfix; ++k) {
-    const Fix& fix = *lmp->modify->fix[k];
-    if (fix.time_integrate || std::strcmp(fix.style, "freeze") == 0) return;
+    Fix* fix = lmp->modify->fix[k];
+    if (fix->time_integrate) moved |= fix->groupbit;
+    if (std::strcmp(fix->style, "freeze") == 0) frozen |= fix->groupbit;
+    inserts |= dynamic_cast<FixInsert*>(fix) != nullptr;
   }
+  const Atom& atom = *lmp->atom;
+  int mine[2] = {0, 0}, all[2] = {0, 0};  // that move, that are neither moved nor frozen
+  for (int i = 0; i < atom.nlocal; ++i) {
+    mine[0] += (atom.mask[i] & moved) != 0;
+    mine[1] += (atom.mask[i] & (moved | frozen)) == 0;
+  }
+  MPI_Allreduce(mine, all, 2, MPI_INT, MPI_SUM, lmp->world);
+  if (all[0] > 0 || (moved != 0 && inserts) || (all[1] == 0 && atom.natoms > 0)) return;
   warn_once(lmp, told, "No fix moves the particles: they stand still; 'fix ID all nve/nurbs' moves them");
 }
 

@@ -413,6 +413,9 @@ class Warned(unittest.TestCase):
         still = DECK.replace("fix motion all nve/nurbs\n", "")
         for text, told in ((still + "run 2\nrun 2\n", 1), (still + "run 0\n", 0), (DECK + "run 2\n", 0),
                            (still + "fix motion all freeze\nrun 2\n", 0),
+                           (still + "group none id 99\nfix motion none nve/nurbs\nrun 2\n", 1),
+                           (still + "group one id 1\nfix motion one freeze\nrun 2\n", 1),
+                           (still + "group one id 1\nfix motion one nve/nurbs\nrun 2\n", 0),
                            (still + "fix motion all move linear 0 0 1\nrun 2\n", 0)):
             screen = deck.run_ok(text, files=files()).screen
             self.assertEqual(screen.count("No fix moves the particles"), told, text)
