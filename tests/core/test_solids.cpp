@@ -375,6 +375,20 @@ TEST(SavedCases, creases_that_just_touch) {
   expect_resolved({{"touching-reuleaux-prisms.json", -1.0937e-9}});
 }
 
+// The normal was off by 2e-6 rad: beside a pole a step is none of Newton's.
+TEST(SavedCases, a_normal_beside_a_pole) {
+  const PairCase pair = read_pair_case("tests/cases/egg-on-large-polyhedron.json");
+  double memory[kPairMemorySize] = {0};
+  const ContactResult r = find_contact(pair.a, pair.b, pair.settings, memory);
+  const auto support = [&](const Particle& p, const Vec3& d) {
+    return p.scale * find_hull_support(*p.shape, p.q.conjugate() * d).h;
+  };
+  const double overlap =
+      support(pair.a, r.normal) + support(pair.b, -r.normal) - r.normal.dot(pair.b.x - pair.a.x);
+  EXPECT_EQ(r.status, Status::converged);
+  EXPECT_NEAR(overlap, -r.gap, 1e-10);
+}
+
 // Missed: corner supports of patches with a collapsed edge.
 TEST(SavedCases, polyhedron_tumbling_on_a_plane) {
   const auto shape = saved_shape("shape-polyhedron-plane.json");
