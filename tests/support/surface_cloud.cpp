@@ -8,6 +8,7 @@ namespace nurbs::test {
 namespace {
 
 constexpr int kPoints = 5000;  // about
+constexpr int kBlock = 4;      // points of a patch's grid, either way
 
 // Newton where d . x is concave, else along the gradient; inside the patch, only ever up.
 Vec3 ascend(const BezierPatch& patch, const Vec3& d, double u, double v) {
@@ -69,13 +70,23 @@ Vec3 SurfaceCloud::exact_point(const Vec3& d) const {
   Vec3 point = points_.row(top);
   const double near = best - 0.01 * shape_.bounding_radius;
   for (size_t p = 0; p < shape_.patches.size(); ++p) {
-    const auto block = heights_.segment(p * count, count);
-    int at;
-    if (block.maxCoeff(&at) < near) continue;
-    const Vec3 x = ascend(shape_.patches[p], d, parameter(at / per_side_), parameter(at % per_side_));
-    if (x.dot(d) <= best) continue;
-    best = x.dot(d);
-    point = x;
+    const auto of_patch = heights_.segment(p * count, count);
+    if (of_patch.maxCoeff() < near) continue;
+    // On a dented face several maxima lie side by side: the highest point of each block of the grid is a
+    // start.
+    for (int i0 = 0; i0 < per_side_; i0 += kBlock)
+      for (int j0 = 0; j0 < per_side_; j0 += kBlock) {
+        int start = -1;
+        for (int i = i0; i < std::min(i0 + kBlock, per_side_); ++i)
+          for (int j = j0; j < std::min(j0 + kBlock, per_side_); ++j)
+            if (start < 0 || of_patch[i * per_side_ + j] > of_patch[start]) start = i * per_side_ + j;
+        if (of_patch[start] < near) continue;
+        const Vec3 x =
+            ascend(shape_.patches[p], d, parameter(start / per_side_), parameter(start % per_side_));
+        if (x.dot(d) <= best) continue;
+        best = x.dot(d);
+        point = x;
+      }
   }
   return point;
 }
