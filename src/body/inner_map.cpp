@@ -261,6 +261,10 @@ int InnerMap::cell(const Vec3& d) {
 InnerMap make_inner_map(const Shape& shape) {
   InnerMap map;
   if (shape.dented() || shape.joint_slack > 0 || widest_kink(shape) > kWidestKink) return map;
+  SurfaceBounds bounds = bound_surface(shape, shape.proofs.sphere, {false, true});
+  // A leaf that may have any normal leaves no direction a radius.
+  const auto tells = [](const Leaf& leaf) { return leaf.bounds.regular; };
+  if (!std::all_of(bounds.leaves.begin(), bounds.leaves.end(), tells)) return map;
   const DirectionAtlas& atlas = shape.atlas;
   map.nodes.resize(atlas.nodes());
   map.stretches.resize(6 * kStretchCells * kStretchCells);
@@ -268,7 +272,6 @@ InnerMap make_inner_map(const Shape& shape) {
     map.nodes[i].point = atlas.point[i];
     map.nodes[i].normal = atlas.direction(i).normalized();
   }
-  SurfaceBounds bounds = bound_surface(shape, shape.proofs.sphere, {false, true});
   if (!shape.proofs.sphere)
     refine_stretches(kLeafCone, kLeafTightness, shape.normal_map.cells > 0 ? kMostFlatCells : kMostLeafCells,
                      &bounds);
