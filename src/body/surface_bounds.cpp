@@ -372,7 +372,9 @@ class Bounder {
         continue;
       }
       const bool bulging = is_bulging_cylinder(shape_.patches[p], shape_.bounding_radius);
-      const double round = std::max(rounding(shape_.patches[p]), balls_[p].radius);
+      const double known =
+          rounding(shape_.patches[p]);  // infinite of planes, which are looked at all the same
+      const double round = std::max(known < kFarAway ? known : 0, balls_[p].radius);
       for (Cell& c : first_cells(shape_, out_.even, p)) {
         Leaf leaf{std::move(c), {}, {}};
         leaf.bounds = enclose(out_.even[p], leaf.cell, wanted(leaf.cell));
