@@ -130,7 +130,8 @@ double raised_by_roundoff(const Shape& shape, const SurfacePoint& at) {
   const Jet1 jet = evaluate1(patch, form.u, form.v);
   const double area = jet.su.cross(jet.sv).norm(), size = shape.bounding_radius;
   const double angle = kTangentNoise * size * (jet.su.norm() + jet.sv.norm()) / std::max(area, 1e-300);
-  return 2 * size * std::min(angle, 1.0);
+  const double raised = 2 * size * std::min(angle, 1.0);
+  return raised > kNoDent * size ? raised : 0;
 }
 
 // Measures dents at single points of a shape.
