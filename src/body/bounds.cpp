@@ -138,6 +138,20 @@ double bound_off_unit_sphere(const BezierPatch& patch) {
   return most;
 }
 
+Vec3 bilinear_normal(const BezierPatch& patch) {
+  const auto corner = [&](int i, int j) { return Vec3(patch.point(i, j).head<3>() / patch.point(i, j)[3]); };
+  const Vec3 a = corner(0, 0), b = corner(0, 1), c = corner(1, 0), d = corner(1, 1);
+  const auto off = [&](const Vec3& n) {
+    return std::max({std::abs(n.dot(b - a)), std::abs(n.dot(c - a)), std::abs(n.dot(d - a))});
+  };
+  const Vec3 middle = ((c - a) + (d - b)).cross((b - a) + (d - c)).normalized();
+  Vec3 best = middle;
+  for (const Vec3& n :
+       {(c - a).cross(b - a), (d - b).cross(b - a), (c - a).cross(d - c), (d - b).cross(d - c)})
+    if (n.dot(middle) > 0 && off(n.normalized()) < off(best)) best = n.normalized();
+  return best;
+}
+
 RadiusBounds bound_radius(const std::vector<BezierPatch>& patches) {
   RadiusBounds bounds;
   bounds.outer = std::sqrt(std::max(0.0, bound_squared(patches, 1)));

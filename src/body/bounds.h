@@ -17,6 +17,10 @@ SquaredDistance squared_distance(const BezierPatch& patch, double less = 0);
 // ||x|^2 - 1| is at most this on a patch.
 double bound_off_unit_sphere(const BezierPatch& patch);
 
+// Unit normal of the plane nearest to a bilinear patch, along S_u x S_v: in the middle or at a corner, as a
+// needle's long sides are all but parallel, of which round-off leaves little.
+Vec3 bilinear_normal(const BezierPatch& patch);
+
 struct RadiusBounds {
   double inner = 0;  // no surface point is nearer to the origin
   double outer = 0;  // none is farther

@@ -123,6 +123,17 @@ Vec3 least_rise(const Planes& planes, double tilt) {
   return {best.at, inner(best.at).at, best.value};
 }
 
+// What the round-off of the normal at a point raises the body by, seen along it: of needles, much.
+double raised_by_roundoff(const Shape& shape, const SurfacePoint& at) {
+  const BezierPatch& patch = shape.patches[at.patch];
+  const LocalForm form = local_form(patch, at.u, at.v);  // beside a pole
+  const Jet1 jet = evaluate1(patch, form.u, form.v);
+  const double area = jet.su.cross(jet.sv).norm(), size = shape.bounding_radius;
+  const double angle = kTangentNoise * size * (jet.su.norm() + jet.sv.norm()) / std::max(area, 1e-300);
+  const double raised = 2 * size * std::min(angle, 1.0);
+  return raised > kNoDent * size ? raised : 0;
+}
+
 // Measures dents at single points of a shape.
 class Probe {
  public:
@@ -134,7 +145,7 @@ class Probe {
     const LocalForm f = form(at);
     double most = 0;
     for (const Vec3& y : supports(f.normal, at)) most = std::max(most, f.normal.dot(y - f.point));
-    return most;
+    return std::max(0.0, most - raised_by_roundoff(shape_, at));
   }
 
   // Distance along the normal from a point to the hull's boundary: by duality the least of h(d) - d . x over
@@ -251,7 +262,8 @@ Dent find_dent(const Shape& shape, const std::vector<SurfaceSample>& samples, co
   const Clouds clouds = choose(samples, suspect ? kPairsIfDented : kPairsIfConvex);
   const std::vector<double> support = sampled_support(clouds), depth = sampled_depth(clouds, support);
   std::vector<double> excess = support;
-  for (size_t j = 0; j < excess.size(); ++j) excess[j] -= clouds.normals.at(j).dot(clouds.points.at(j));
+  for (size_t j = 0; j < excess.size(); ++j)
+    excess[j] -= clouds.normals.at(j).dot(clouds.points.at(j)) + raised_by_roundoff(shape, clouds.places[j]);
   const size_t deepest = index_of_largest(depth), highest = index_of_largest(excess);
 
   Dent dent;

@@ -31,8 +31,10 @@ std::vector<Sample> samples_of(const BezierPatch& patch) {
 }
 
 bool is_plane(const BezierPatch& patch, const Sample& s, double size) {
+  const bool bilinear = patch.degree_u == 1 && patch.degree_v == 1;
+  const Vec3 n = bilinear ? bilinear_normal(patch) : s.n;
   return std::all_of(patch.points.begin(), patch.points.end(), [&](const Vec4& p) {
-    return std::abs(s.n.dot(p.head<3>() / p[3] - s.x)) <= kRounded * size;
+    return std::abs(n.dot(p.head<3>() / p[3] - s.x)) <= kRounded * size;
   });
 }
 
@@ -42,7 +44,9 @@ double off_unit(BezierPatch patch, const Vec3& centre, const Mat3& map) {
   return bound_off_unit_sphere(patch);
 }
 
-double radius_of(const BezierPatch& patch) {
+}  // namespace
+
+double rounding(const BezierPatch& patch) {
   const std::vector<Sample> samples = samples_of(patch);
   const Sample* one = &samples[0];
   const Sample* two = &samples[0];
@@ -59,16 +63,20 @@ double radius_of(const BezierPatch& patch) {
   const Vec3 centre = one->x - radius * one->n, axis = one->n.cross(two->n).normalized();
   const Mat3 sphere = Mat3::Identity() / radius,
              cylinder = (Mat3::Identity() - axis * axis.transpose()) / radius;
-  const double off = std::min(off_unit(patch, centre, sphere), off_unit(patch, centre, cylinder));
-  return off <= kRounded ? radius * (1 - kBentAnyhow - kBentBy * off) : 0;
+  // Of a small part of a ball, or a narrow strip of a cylinder, an error of position bends more.
+  const double in_u = (samples[7].n - samples[1].n).norm(), in_v = (samples[5].n - samples[3].n).norm();
+  const auto bent = [&](const Mat3& map, double angle) {
+    const double off = off_unit(patch, centre, map);
+    return off <= kRounded ? kBentBy * off / std::min(1.0, angle * angle) : kFarAway;
+  };
+  const double error = std::min(bent(sphere, std::min(in_u, in_v)), bent(cylinder, std::max(in_u, in_v)));
+  return std::max(radius * (1 - kBentAnyhow - error), 0.0);
 }
-
-}  // namespace
 
 double least_rounding(const std::vector<BezierPatch>& patches) {
   double least = kFarAway;
   for (const BezierPatch& patch : patches) {
-    least = std::min(least, radius_of(patch));
+    least = std::min(least, rounding(patch));
     if (!(least > 0)) return 0;
   }
   return least;

@@ -7,6 +7,9 @@
 
 namespace nurbs {
 
+// Of one patch: 0 if it is none of these, infinite if it is plane.
+double rounding(const BezierPatch& patch);
+
 // The least radius of the cylinders and spheres if every patch lies in one, or in a plane, to kRounded of its
 // size (proven from Bernstein coefficients), less what their round-off may bend them by; 0 where a patch does
 // not, infinite where all are plane. Enclosed curvatures (surface_bounds.h) are tight to kRadiusTightness

@@ -313,7 +313,7 @@ Support climb(const Shape& shape, const Vec3& d, SurfacePoint at) {
   return best;
 }
 
-// The highest of all patches, knowing `low`, the height of some surface point.
+// The highest of all patches, knowing `low`, the height of some surface point and what it bounds.
 Support search_patches(const Shape& shape, const Vec3& d, const Support& low) {
   const double slack = kSupportSlack * kRoundoff * shape.bounding_radius;
   Highest top{low.where, low.h, low.h + slack, 0};
@@ -325,7 +325,7 @@ Support search_patches(const Shape& shape, const Vec3& d, const Support& low) {
   Support s;
   const Jet1 jet = evaluate1(shape.patches[top.where.patch], top.where.u, top.where.v);
   set_point(shape, d, top.where, jet.s, jet.su, jet.sv, &s);
-  s.upper = std::max(top.upper, s.h);
+  s.upper = std::max(std::min(top.upper, low.upper), s.h);  // of slivers the search is cut short
   s.slope = 0;
   s.iterations = low.iterations + top.boxes;
   s.converged = s.upper - s.h <= 2 * slack;

@@ -1,13 +1,15 @@
 // Halving of cells, level by level; see surface_bounds.h.
 #include "body/surface_bounds.h"
 
-#include <Eigen/LU>
+#include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
 #include <limits>
 #include <numeric>
 #include <optional>
 
+#include "body/bounds.h"
+#include "body/rounding.h"
 #include "nurbs/tolerances.h"
 
 namespace nurbs {
@@ -19,6 +21,8 @@ constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr int kLeastRadiusBudget = 4;
 // The same for the proof of convexity, where no hollow is seen: without it every support is doubted.
 constexpr int kConvexBudget = 6;
+constexpr int kDeepestOnBall =
+    10;  // halvings of a patch on a ball: parameters that still fold are a sliver's
 constexpr double kPlaneTilt = 1e-6;     // rad: more of a tilt within a patch is no plane's round-off
 constexpr double kSurelyTurned = 1e-6;  // least over largest coefficient of a volume: far above round-off
 constexpr double kBent = 1e-3;          // over the bounding radius: a curvature worth it
@@ -75,9 +79,11 @@ std::optional<CellBounds> plane_bounds(const BezierPatch& patch, double size) {
   const Vec3 twice = 0.5 * ((c - a) + (d - b)).cross((b - a) + (d - c));  // as long as twice the area
   const double area = twice.norm();
   if (!(area > 0)) return std::nullopt;
-  const Vec3 n = twice / area;
+  const Vec3 n = bilinear_normal(patch);
+  if (!(n.dot(twice) > 0)) return std::nullopt;
   double off = 0;
-  for (const Vec3& p : {b, c, d}) off = std::max(off, std::abs(n.dot(p - a)));
+  for (const Vec3& p : {b, c, d})
+    off = std::max(off, std::abs(n.dot(p - a)) + std::numeric_limits<double>::epsilon() * (p - a).norm());
   if (!(off <= kNoDent * size)) return std::nullopt;
   // x_u x x_v is bilinear here: positive where it is so at the corners.
   const double jacobian[4] = {n.dot((c - a).cross(b - a)), n.dot((d - b).cross(b - a)),
@@ -89,9 +95,11 @@ std::optional<CellBounds> plane_bounds(const BezierPatch& patch, double size) {
   for (const double j : jacobian)
     if (j > kNoDent * area) sure = std::min(sure, j);
   const double du = std::max((c - a).norm(), (d - b).norm()), dv = std::max((b - a).norm(), (d - c).norm());
-  // Off the plane a tangent goes 2 off at most, and x_uv 4 off: of a needle that is much of an angle.
+  // Off the plane a tangent goes 2 off at most, and x_uv 4 off: of a needle that is much of an angle, and of
+  // a curvature, which a triangle has none of.
   const double tilt = 2 * off * (du + dv) / sure;
-  if (!(tilt < kPlaneTilt && 4 * off * size <= kCurvatureNoise * sure)) return std::nullopt;
+  const bool triangle = a == b || a == c || b == d || c == d;
+  if (!(tilt < kPlaneTilt && (triangle || 4 * off * size <= kCurvatureNoise * sure))) return std::nullopt;
   CellBounds out;
   out.regular = true;
   out.axis = n;
@@ -164,40 +172,48 @@ struct Ball {
   double radius = 0;  // 0: none
 };
 
-// The ball on which a patch bulges outward, up to round-off: |x - c|^2 - r^2 is a rational function, and
+bool may_be_round(const BezierPatch& patch) {
+  return patch.rational && patch.degree_u >= 2 && patch.degree_v >= 2;
+}
+
+// Whether a patch bulges outward on a ball, up to round-off: |x - c|^2 - r^2 is a rational function, and
 // bounded by its net.
-Ball ball_of(const BezierPatch& patch, double size) {
+bool lies_on(const Ball& ball, const BezierPatch& patch, double size) {
   const int p = patch.degree_u, q = patch.degree_v;
-  if (!patch.rational || p < 2 || q < 2) return {};
-  // 2 x . c + (r^2 - |c|^2) = |x|^2 at four places.
-  Eigen::Matrix4d places;
-  Vec4 squares;
-  constexpr double kAt[4][2] = {{0, 0.5}, {1, 0.5}, {0.5, 0}, {0.4, 1}};
-  const Vec3 middle = evaluate0(patch, 0.5, 0.5);
-  for (int k = 0; k < 4; ++k) {
-    const Vec3 x = evaluate0(patch, kAt[k][0], kAt[k][1]) - middle;
-    places.row(k) << 2 * x.transpose(), 1;
-    squares[k] = x.squaredNorm();
-  }
-  const Vec4 solution = places.fullPivLu().solve(squares);
-  const Vec3 center = middle + solution.head<3>();
-  const double r2 = solution[3] + solution.head<3>().squaredNorm(), r = std::sqrt(std::max(r2, 0.0));
-  if (!(r > 0 && r < kLongRadius * size)) return {};
+  if (ball.radius == 0 || !may_be_round(patch)) return false;
   Form<Vec4> net(p, q, Vec4::Zero());  // about the centre
   double lightest = kInfinity;
   for (int i = 0; i <= p; ++i)
     for (int j = 0; j <= q; ++j) {
       net(i, j) = patch.point(i, j);
-      net(i, j).head<3>() -= net(i, j)[3] * center;
+      net(i, j).head<3>() -= net(i, j)[3] * ball.center;
       lightest = std::min(lightest, net(i, j)[3]);
     }
   const auto off = multiplied(net, net, [&](const Vec4& a, const Vec4& b) {
-    return a.head<3>().dot(b.head<3>()) - r2 * a[3] * b[3];
+    return a.head<3>().dot(b.head<3>()) - ball.radius * ball.radius * a[3] * b[3];
   });
   for (const double f : off.at)
-    if (!(std::abs(f) <= 2 * r * kNoDent * size * lightest * lightest)) return {};
+    if (!(std::abs(f) <= 2 * ball.radius * kNoDent * size * lightest * lightest)) return false;
   const Jet2 j = evaluate2(patch, 0.5, 0.5);
-  return j.su.cross(j.sv).dot(j.s - center) > 0 ? Ball{center, r} : Ball{};
+  return j.su.cross(j.sv).dot(j.s - ball.center) > 0;
+}
+
+// The ball on which a patch lies, if any.
+Ball ball_of(const BezierPatch& patch, double size) {
+  if (!may_be_round(patch)) return {};
+  // 2 x . c = |x|^2 about a point of it, at eight places all round: of a small patch four lie in a plane.
+  Eigen::Matrix<double, 8, 3> places;
+  Eigen::Matrix<double, 8, 1> squares;
+  const Vec3 middle = evaluate0(patch, 0.5, 0.5);
+  for (int k = 0; k < 8; ++k) {
+    const int at = k < 4 ? k : k + 1;
+    const Vec3 x = evaluate0(patch, 0.5 * (at / 3), 0.5 * (at % 3)) - middle;
+    places.row(k) = 2 * x.transpose();
+    squares[k] = x.squaredNorm();
+  }
+  const Vec3 to_center = places.colPivHouseholderQr().solve(squares), center = middle + to_center;
+  const Ball ball{center, to_center.norm()};
+  return ball.radius < kLongRadius * size && lies_on(ball, patch, size) ? ball : Ball{};
 }
 
 // Whether the net of (x - c) . x_u x x_v shows that a patch on a ball has a normal all over a cell, whatever
@@ -344,9 +360,11 @@ class Bounder {
     for (BezierPatch& patch : out_.even) {
       changes_.push_back(even_out(&patch));
       const auto& links = shape_.links[balls_.size()];  // at poles cells are of another kind
-      const bool pole = std::any_of(links.begin(), links.end(), [](const auto& l) { return l.collapsed; });
+      const bool pole = std::any_of(links.begin(), links.end(),
+                                    [&](const auto& l) { return smooth_pole(l, shape_.bounding_radius); });
       balls_.push_back(pole ? Ball{} : ball_of(patch, shape_.bounding_radius));
     }
+    share_balls();
     for (int p = 0; p < patches_; ++p) {
       if (const auto plane = plane_bounds(out_.even[p], shape_.bounding_radius)) {
         open_.push_back({{whole_patch(out_.even, p), *plane, {}}, kDeepestCell});  // nothing is left to find
@@ -354,10 +372,14 @@ class Bounder {
         continue;
       }
       const bool bulging = is_bulging_cylinder(shape_.patches[p], shape_.bounding_radius);
+      const double known =
+          rounding(shape_.patches[p]);  // infinite of planes, which are looked at all the same
+      const double round = std::max(known < kFarAway ? known : 0, balls_[p].radius);
       for (Cell& c : first_cells(shape_, out_.even, p)) {
         Leaf leaf{std::move(c), {}, {}};
         leaf.bounds = enclose(out_.even[p], leaf.cell, wanted(leaf.cell));
         on_ball(balls_[p], out_.even[p], &leaf);
+        leaf.bounds.min_radius = std::max(leaf.bounds.min_radius, round);
         if (bulging) leaf.bounds.least_curvature = std::max(leaf.bounds.least_curvature, 0.0);
         ++out_.cells;
         see(leaf);
@@ -384,6 +406,17 @@ class Bounder {
     for (Open& o : open_) out_.leaves.push_back(std::move(o.leaf));
     finish();
     return std::move(out_);
+  }
+
+  // A sliver of a ball tells little of it: a neighbour may know.
+  void share_balls() {
+    const std::vector<Ball> own = balls_;
+    for (int p = 0; p < patches_; ++p)
+      for (const EdgeLink& link : shape_.links[p]) {
+        if (balls_[p].radius > 0 || smooth_pole(link, shape_.bounding_radius)) break;
+        if (link.patch < 0) continue;
+        if (lies_on(own[link.patch], out_.even[p], shape_.bounding_radius)) balls_[p] = own[link.patch];
+      }
   }
 
   bool wants_rate(const Cell& c) const { return with_rates_ && !in_pole_strip(shape_, c); }
@@ -441,12 +474,17 @@ class Bounder {
 
   // The least radius first: with none at all no ball rolls inside, and every answer is dear.
   bool least_loose(const Open& o) const {
-    return o.leaf.bounds.min_radius < out_.seen_min / kRadiusTightness;
+    const bool normals = o.leaf.bounds.regular || left_as_sliver(o);
+    return !normals || o.leaf.bounds.min_radius < out_.seen_min / kRadiusTightness;
+  }
+
+  bool left_as_sliver(const Open& o) const {
+    return balls_[o.leaf.cell.patch].radius > 0 && o.depth >= kDeepestOnBall;
   }
 
   bool unproven(const Open& o) const {
     const CellBounds& b = o.leaf.bounds;
-    return !b.convex && b.seen_curvature > 0 && !is_flat(b, shape_.bounding_radius);
+    return !left_as_sliver(o) && !b.convex && b.seen_curvature > 0 && !is_flat(b, shape_.bounding_radius);
   }
 
   bool bent(const Open& o) const { return o.leaf.bounds.seen_curvature > kBent / shape_.bounding_radius; }

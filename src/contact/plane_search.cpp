@@ -145,7 +145,8 @@ class PlaneLadder {
     const bool warm = memory_.on_b.patch >= 0;
     const SurfacePoint start = surface_point(memory_.on_b);
     r->rung = warm ? Rung::warm : Rung::cold;
-    finish(find_hull_support(shape_, d_, warm ? &start : nullptr), r);
+    const double enough = kSupportShare * settings_.tolerance * shape_.bounding_radius;
+    finish(find_hull_support(shape_, d_, warm ? &start : nullptr, enough), r);
   }
 
   void finish(const Support& s, ContactResult* r) {

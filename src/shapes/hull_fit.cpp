@@ -70,6 +70,8 @@ constexpr double kVolumeError = 0.1;
 constexpr size_t kStrictPoints = 602;  // seconds
 constexpr int kClosestSteps = 40;
 constexpr double kClosestStride = 0.3;  // parameters
+constexpr double kFootSlope = 1e-6;     // rad off the normal: a foot point
+constexpr double kSingularFoot = 1e-6;  // sine between the tangents, below which there is no normal
 constexpr int kMostPieces = 200000;
 
 // --- certificates
@@ -92,19 +94,31 @@ double distance_by_supports(const Shape& shape, const Vec3& v, double enough) {
   return nearest.norm();
 }
 
+// Whether v lies between s, a point of the body, and the ball inside it about the origin.
+bool in_cone_of_inner_ball(const Shape& shape, const Vec3& s, const Vec3& v) {
+  const Vec3 way = v - s;
+  const double along = -s.dot(way);
+  const bool before = along >= way.squaredNorm();  // the ray's nearest point to the origin comes after v
+  const Vec3 nearest = before ? Vec3(s + way * (along / way.squaredNorm())) : v;
+  return nearest.norm() <= shape.inner_radius;
+}
+
 // Upper bound of the distance from a point to the body, 0 where it is inside: Newton's method for the closest
-// surface point. A foot point from which the point is seen along the inward normal, nearer than the body's
-// inner radius, shows that it is inside; where nothing is shown, the distance to a surface point is returned.
+// surface point, whose distance is a bound; where that shows too little, supports.
 double distance_to_body(const Shape& shape, const Vec3& v, double enough) {
   SurfacePoint at = find_support(shape, v.normalized()).where;
   double best = 1e300;
   for (int k = 0; k < kClosestSteps; ++k) {
     const Jet2 j = evaluate2(shape.patches[at.patch], at.u, at.v);
     const Vec3 off = v - j.s, cross = j.su.cross(j.sv);
-    const bool foot = off.cross(cross).norm() <= 1e-6 * off.norm() * cross.norm();
-    if (foot && off.dot(cross) <= 0 && off.norm() < shape.inner_radius) return 0;
     best = std::min(best, off.norm());
-    if (best <= enough || foot) return best;
+    if (best <= enough) return best;
+    if (in_cone_of_inner_ball(shape, j.s, v)) return 0;
+    if (!(cross.norm() > kSingularFoot * j.su.norm() * j.sv.norm())) break;
+    if (off.cross(cross).norm() <= kFootSlope * off.norm() * cross.norm()) {
+      if (off.dot(cross) > 0) return best;
+      break;
+    }
     Mat2 hessian;
     hessian << j.su.dot(j.su) - off.dot(j.suu), j.su.dot(j.sv) - off.dot(j.suv),
         j.su.dot(j.sv) - off.dot(j.suv), j.sv.dot(j.sv) - off.dot(j.svv);

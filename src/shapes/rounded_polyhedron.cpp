@@ -17,6 +17,7 @@ namespace {
 
 constexpr double kSameSide = 0.9;    // cosine of normals: narrow triangles within a plane have poor ones
 constexpr double kSamePoint = 1e-9;  // of the extent
+constexpr double kBlunt = 2e-5;      // least |S_u x S_v| over the extent squared that tells a patch's plane
 // Triangles looked at for the planes of large faces, by how much those are larger than the next one, and of
 // how many faces such a body has at the most.
 constexpr size_t kLargestTriangles = 200, kMostLargeFaces = 30;
@@ -146,6 +147,36 @@ std::vector<std::array<int, 4>> quadrilaterals(int corners) {
   return out;
 }
 
+// |S_u x S_v| where it is least, at a corner of a quadrilateral; of a triangle, whose first corner is there
+// twice, twice the area.
+double least_area(const std::vector<Vec3>& x, const std::array<int, 4>& q) {
+  const auto at = [&](int k, int before, int behind) {
+    return (x[q[behind]] - x[q[k]]).cross(x[q[before]] - x[q[k]]).norm();
+  };
+  if (q[0] == q[1]) return at(1, 3, 2);
+  return std::min(std::min(at(0, 3, 1), at(1, 0, 2)), std::min(at(2, 1, 3), at(3, 2, 0)));
+}
+
+// A convex polygon in a plane as quadrilaterals and triangles, those with next to no angle at a corner as two
+// triangles: there the parameters have no directions that tell the plane.
+std::vector<std::array<int, 4>> well_shaped(const std::vector<Vec3>& corners, double size) {
+  std::vector<std::array<int, 4>> out;
+  for (const std::array<int, 4>& q : quadrilaterals(static_cast<int>(corners.size()))) {
+    const auto& [a, b, c, d] = q;
+    if (a == b || least_area(corners, q) > kBlunt * size * size) {
+      out.push_back(q);
+      continue;
+    }
+    const std::array<int, 4> one[2] = {{a, a, b, c}, {a, a, c, d}}, other[2] = {{b, b, c, d}, {b, b, d, a}};
+    const auto least = [&](const std::array<int, 4>(&pair)[2]) {
+      return std::min(least_area(corners, pair[0]), least_area(corners, pair[1]));
+    };
+    const auto& best = least(one) < least(other) ? other : one;
+    out.insert(out.end(), best, best + 2);
+  }
+  return out;
+}
+
 // Counterclockwise: u runs from the first side (corners 0, 1) to the opposite one, v along it.
 NurbsSurface flat_patch(const Vec3& a, const Vec3& b, const Vec3& c, const Vec3& d) {
   return bezier(1, 1, {homogeneous(a, 1), homogeneous(b, 1), homogeneous(d, 1), homogeneous(c, 1)});
@@ -239,7 +270,8 @@ class SpherePatch {
 // Makes edges that patches share the same bits: corners are computed once, per vertex and face.
 class Rounder {
  public:
-  Rounder(const Polyhedron& solid, double rounding) : solid_(solid), rounding_(rounding) {}
+  Rounder(const Polyhedron& solid, double rounding)
+      : solid_(solid), rounding_(rounding), size_(extent(solid.points)) {}
 
   std::vector<NurbsSurface> run() {
     for (size_t f = 0; f < solid_.faces.size(); ++f) add_face(static_cast<int>(f));
@@ -259,9 +291,10 @@ class Rounder {
     const std::vector<int>& loop = solid_.faces[f].loop;
     const int n = static_cast<int>(loop.size());
     for (int k = 0; k < n; ++k) of_edge_[{loop[k], loop[(k + 1) % n]}] = f;
-    for (const auto& [a, b, c, d] : quadrilaterals(n))
-      out_.push_back(
-          flat_patch(corner(loop[a], f), corner(loop[b], f), corner(loop[c], f), corner(loop[d], f)));
+    std::vector<Vec3> corners;
+    for (const int v : loop) corners.push_back(corner(v, f));
+    for (const auto& [a, b, c, d] : well_shaped(corners, size_))
+      out_.push_back(flat_patch(corners[a], corners[b], corners[c], corners[d]));
   }
 
   void add_edge(const std::pair<int, int>& edge, int face) {
@@ -320,7 +353,7 @@ class Rounder {
   }
 
   const Polyhedron& solid_;
-  const double rounding_;
+  const double rounding_, size_;
   std::map<std::pair<int, int>, int> of_edge_;  // the face to the left of a directed edge
   std::vector<std::vector<int>> around_;        // faces of each vertex
   bool halved_ = false;  // all arcs at corners, so that a corner of any number of faces is of quadrilaterals
