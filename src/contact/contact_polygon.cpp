@@ -130,6 +130,20 @@ double stored_energy(const ContactPolygon& polygon, const PolygonState& state) {
   return polygon.factor * state.energy;
 }
 
+bool rolled_along(const ContactPolygon& old, const ContactPolygon& polygon) {
+  if (old.rolling == 0 || polygon.rolling == 0 || old.count != 2 || polygon.count != 2 ||
+      old.reference != polygon.reference)
+    return false;
+  const Vec3 from = load(polygon.point[0]), way = load(polygon.point[1]) - from,
+             old_way = load(old.point[1]) - load(old.point[0]);
+  if (!(std::abs(way.dot(old_way)) >= kSameLine * way.norm() * old_way.norm())) return false;
+  for (int i = 0; i < 2; ++i) {
+    const double t = (load(old.point[i]) - from).dot(way) / way.squaredNorm();
+    if (!(t >= -kRolledPast && t <= 1 + kRolledPast)) return false;
+  }
+  return true;
+}
+
 double energy_after_rolling(const ContactPolygon& old, const ContactPolygon& polygon,
                             const PolygonState& state) {
   const Vec3 from = load(polygon.point[0]), way = load(polygon.point[1]) - from;

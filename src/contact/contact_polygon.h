@@ -60,6 +60,8 @@ constexpr double kSlideShare = 1e-3;  // of the polygon's size that cut points m
 constexpr double kReferenceShare = 0.05;  // of the overlap by which the other face must be the shallower one
                                           // to become the reference
 constexpr double kOutgrownShare = 0.1;    // of the overlap by which the body may be deeper than its points
+constexpr double kSameLine = 0.99;        // cosine between a line and the one it rolled to ...
+constexpr double kRolledPast = 0.5;       // ... and of its length that the old one may reach past it
 constexpr double kRelaxed = 1e-8;         // of the factor: as good as 1
 constexpr double kClearTurn = 0.2;   // of the smaller bounding radius: what a contact's normal that turns
                                      // by 1 rad takes off its clear way
@@ -159,6 +161,10 @@ double still_holds(const PolygonState& state, double support_gap, double radius_
 
 // U / kn, the factor included.
 double stored_energy(const ContactPolygon& polygon, const PolygonState& state);
+
+// Whether the polygon is a segment of the line that `old`, of the same bodies, has rolled to: along it, and
+// no longer than it by much. Another edge of the body is not.
+bool rolled_along(const ContactPolygon& old, const ContactPolygon& polygon);
 
 // What `old` holds once its points have gone to the line where the new polygon of the same bodies lies, each
 // staying where it is along it: both are segments of ruled lines, and rolling costs nothing. `state` is the

@@ -249,10 +249,8 @@ bool ContactStages::remake(ContactBlock& block, int lane, FlatContact& flat, Pol
   const PolygonState fresh = now(polygon, *step_.bodies, wall_frame(a), a, b);
   // Springs keep their energy; what would make them too stiff they lose, which is booked. An old line that
   // rolled has left the place where it bore.
-  const bool rolls = flat.polygon.rolling != 0 && polygon.rolling != 0 && flat.polygon.count == 2 &&
-                     polygon.count == 2 && flat.polygon.reference == polygon.reference;
-  const double held =
-      rolls ? energy_after_rolling(flat.polygon, polygon, fresh) : stored_energy(flat.polygon, state);
+  const double held = rolled_along(flat.polygon, polygon) ? energy_after_rolling(flat.polygon, polygon, fresh)
+                                                          : stored_energy(flat.polygon, state);
   const double holds = stored_energy(polygon, fresh);
   if (holds > 0)
     polygon.factor = std::min(polygon.factor * held / holds, std::max(kStiffest, polygon.factor));

@@ -684,6 +684,28 @@ TEST(RegionPolygon, where_there_is_none_there_is_none_on_the_clear_way) {
   for (const int count : found) EXPECT_GT(count, 50);  // points, features beside the region, polygons
 }
 
+// A fitted prism came down on one edge and went on to the next, shorter one: as a line rolled there, the old
+// points would have held a hundred times their energy, far out on the new edge's line.
+TEST(ContactPolygon, another_edge_is_no_line_that_rolled) {
+  ContactPolygon old{}, polygon{};
+  old.count = polygon.count = 2;
+  old.rolling = polygon.rolling = 1;
+  const auto place = [](double x, double y, double* to) { to[0] = x, to[1] = y, to[2] = 0; };
+  place(-1.1347, -0.9061, old.point[0]);
+  place(-1.5476, -0.8278, old.point[1]);
+  place(-1.5639, -0.8080, polygon.point[0]);
+  place(-1.5470, -0.8238, polygon.point[1]);
+  EXPECT_FALSE(rolled_along(old, polygon));  // another way
+  place(-1.5476, -0.8278, polygon.point[0]);
+  place(-1.5276, -0.8316, polygon.point[1]);
+  EXPECT_FALSE(rolled_along(old, polygon));  // the same, but a short part of it
+  place(-1.5476, -0.8278 + 0.01, polygon.point[0]);
+  place(-1.1347, -0.9061 + 0.01, polygon.point[1]);
+  EXPECT_TRUE(rolled_along(old, polygon));
+  polygon.reference = 1;
+  EXPECT_FALSE(rolled_along(old, polygon));
+}
+
 TEST(ContactPolygon, is_plain_data) {
   Particle p;
   p.shape = cuboid().get();
