@@ -130,15 +130,22 @@ double stored_energy(const ContactPolygon& polygon, const PolygonState& state) {
   return polygon.factor * state.energy;
 }
 
+// Where a point, or the foot of its perpendicular, lies along a segment: 0 at its first point, 1 at the
+// second.
+static double along(const ContactPolygon& segment, const double* point) {
+  const Vec3 from = load(segment.point[0]), way = load(segment.point[1]) - from;
+  return (load(point) - from).dot(way) / way.squaredNorm();
+}
+
 bool rolled_along(const ContactPolygon& old, const ContactPolygon& polygon) {
   if (old.rolling == 0 || polygon.rolling == 0 || old.count != 2 || polygon.count != 2 ||
       old.reference != polygon.reference)
     return false;
-  const Vec3 from = load(polygon.point[0]), way = load(polygon.point[1]) - from,
+  const Vec3 way = load(polygon.point[1]) - load(polygon.point[0]),
              old_way = load(old.point[1]) - load(old.point[0]);
   if (!(std::abs(way.dot(old_way)) >= kSameLine * way.norm() * old_way.norm())) return false;
   for (int i = 0; i < 2; ++i) {
-    const double t = (load(old.point[i]) - from).dot(way) / way.squaredNorm();
+    const double t = along(polygon, old.point[i]);
     if (!(t >= -kRolledPast && t <= 1 + kRolledPast)) return false;
   }
   return true;
@@ -146,11 +153,10 @@ bool rolled_along(const ContactPolygon& old, const ContactPolygon& polygon) {
 
 double energy_after_rolling(const ContactPolygon& old, const ContactPolygon& polygon,
                             const PolygonState& state) {
-  const Vec3 from = load(polygon.point[0]), way = load(polygon.point[1]) - from;
   PolygonState rolled = state;
   rolled.energy = 0;
   for (int i = 0; i < 2; ++i) {
-    const double t = (load(old.point[i]) - from).dot(way) / way.squaredNorm();
+    const double t = along(polygon, old.point[i]);
     const double overlap = std::max(0.0, -(state.gap[0] + t * (state.gap[1] - state.gap[0])));
     rolled.energy += 0.5 * old.weight[i] * overlap * overlap;
   }

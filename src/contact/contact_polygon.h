@@ -163,7 +163,7 @@ double still_holds(const PolygonState& state, double support_gap, double radius_
 double stored_energy(const ContactPolygon& polygon, const PolygonState& state);
 
 // Whether the polygon is a segment of the line that `old`, of the same bodies, has rolled to: along it, and
-// no longer than it by much. Another edge of the body is not.
+// not much shorter. Another edge of the body is not.
 bool rolled_along(const ContactPolygon& old, const ContactPolygon& polygon);
 
 // What `old` holds once its points have gone to the line where the new polygon of the same bodies lies, each

@@ -60,6 +60,11 @@ def cone(sides, radius=1.0, height=2.0):
     return points, np.concatenate([np.c_[following, own, np.full(sides, sides)], np.c_[own, following, np.full(sides, sides + 1)]])
 
 
+def halves(quadrilaterals):
+    """Two triangles of each."""
+    return [face for a, b, c, d in quadrilaterals for face in ((a, b, c), (a, c, d))]
+
+
 def turned(points, seed):
     q, r = np.linalg.qr(np.random.default_rng(seed).normal(size=(3, 3)))
     q *= np.sign(np.linalg.det(q))

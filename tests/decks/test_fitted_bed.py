@@ -14,35 +14,57 @@ import meshes  # noqa: E402
 
 PRIMES = (15485863, 15485867, 15485917, 15485927, 15485933, 15485941, 15485959, 15485989, 15485993, 15486013, 15486041)
 
-DECK = """
+BED = """
 units si
 newton off
 communicate single vel yes
 atom_style nurbs {files}
-boundary p p f
-region box block -6 6 -6 6 0 20 units box
+{space}
 create_box 1 box
 neighbor 0.3 bin
 neigh_modify delay 0
-pair_style gran/nurbs tolerance 1e-6
-pair_coeff * * kn 1e6 kt 5e5 cn 3e3 mu 0.4
-fix floor all wall/nurbs plane 0 0 0 0 0 1 kn 1e6 kt 5e5 cn 3e3 mu 0.4
+pair_style gran/nurbs {settings}
+pair_coeff * * {law}
+{walls} {law}
 fix gravity all gravity 9.81 vector 0 0 -1
 fix motion all nve/nurbs
 {templates}
 fix mix all particledistribution/discrete 32452843 {count} {shares}
-region fill block -6 6 -6 6 2 12 units box
+region fill block {fill} units box
 fix insert all insert/pack seed 49979687 distributiontemplate mix insert_every once overlapcheck yes all_in yes &
- particles_in_region 60 region fill
-timestep 5e-4
+ particles_in_region {bodies} region fill
+timestep {step}
 run 1
 unfix insert
 compute stats all nurbs/stats
 compute low all reduce min z
-thermo_style custom step atoms ke c_stats[8] c_stats[10] c_low
-thermo 20
+{output}
 run {steps}
 """
+
+FLOOR = {
+    "space": "boundary p p f\nregion box block -6 6 -6 6 0 20 units box", "settings": "tolerance 1e-6",
+    "law": "kn 1e6 kt 5e5 cn 3e3 mu 0.4", "walls": "fix floor all wall/nurbs plane 0 0 0 0 0 1", "fill": "-6 6 -6 6 2 12",
+    "bodies": 60, "step": "5e-4", "output": "thermo_style custom step atoms ke c_stats[8] c_stats[10] c_low\nthermo 20"}
+
+BOX = {
+    "space": "boundary f f f\nregion box block -2.5 2.5 -2.5 2.5 -0.5 6.5 units box\nprocessors 2 1 1", "settings": "",
+    "law": "kn 1e8 kt 5e7 cn 6e4 mu 0.4",
+    "walls": "fix box all mesh/surface file box.stl type 1\nfix wall all wall/nurbs mesh box", "fill": "-2 2 -2 2 0.1 5.9",
+    "bodies": 30, "step": "4e-5", "output": """
+compute moving all ke
+compute turning all erotate/nurbs
+compute ledger all nurbs/energy
+variable weight atom mass*9.81*z
+compute lifted all reduce sum v_weight
+variable kinetic equal c_moving+c_turning
+variable lost equal c_ledger[3]+c_ledger[4]
+variable sum equal v_kinetic+c_lifted+c_ledger[1]+c_ledger[2]+v_lost
+variable unresolved equal c_stats[10]
+fix worst all ave/time 1 1 1 v_unresolved file unresolved.txt
+thermo_style custom step atoms v_kinetic v_lost v_sum c_low
+thermo_modify norm no
+thermo 1000"""}
 
 
 def make_shapes(place, count):
@@ -59,56 +81,12 @@ def make_shapes(place, count):
     return {name: (place / name).read_text() for name in files}
 
 
-def bed(names, steps, text=DECK):
+def bed(names, steps, scene=FLOOR):
     stems = [name.split(".")[0] for name in names]
-    return text.format(files=" ".join(names), count=len(names), steps=steps,
-                       templates="\n".join(f"fix t{k} all particletemplate/nurbs {PRIMES[k]} atom_type 1 density constant 1000"
-                                           f" shape {stem} scale constant 1" for k, stem in enumerate(stems)),
-                       shares=" ".join(f"t{k} {1 / len(names):.6f}" for k in range(len(names))))
-
-
-BOX = """
-units si
-newton off
-communicate single vel yes
-atom_style nurbs {files}
-boundary f f f
-region box block -2.5 2.5 -2.5 2.5 -0.5 6.5 units box
-processors 2 1 1
-create_box 1 box
-neighbor 0.3 bin
-neigh_modify delay 0
-pair_style gran/nurbs
-pair_coeff * * kn 1e8 kt 5e7 cn 6e4 mu 0.4
-fix box all mesh/surface file box.stl type 1
-fix wall all wall/nurbs mesh box kn 1e8 kt 5e7 cn 6e4 mu 0.4
-fix gravity all gravity 9.81 vector 0 0 -1
-fix motion all nve/nurbs
-{templates}
-fix mix all particledistribution/discrete 32452843 {count} {shares}
-region fill block -2 2 -2 2 0.1 5.9 units box
-fix insert all insert/pack seed 49979687 distributiontemplate mix insert_every once overlapcheck yes all_in yes &
- particles_in_region 30 region fill
-timestep 4e-5
-run 1
-unfix insert
-compute stats all nurbs/stats
-compute moving all ke
-compute turning all erotate/nurbs
-compute ledger all nurbs/energy
-variable weight atom mass*9.81*z
-compute lifted all reduce sum v_weight
-variable kinetic equal c_moving+c_turning
-variable lost equal c_ledger[3]+c_ledger[4]
-variable sum equal v_kinetic+c_lifted+c_ledger[1]+c_ledger[2]+v_lost
-variable unresolved equal c_stats[10]
-fix worst all ave/time 1 1 1 v_unresolved file unresolved.txt
-compute low all reduce min z
-thermo_style custom step atoms v_kinetic v_lost v_sum c_low
-thermo_modify norm no
-thermo 1000
-run 48000
-"""
+    return BED.format(files=" ".join(names), count=len(names), steps=steps,
+                      templates="\n".join(f"fix t{k} all particletemplate/nurbs {PRIMES[k]} atom_type 1 density constant 1000"
+                                          f" shape {stem} scale constant 1" for k, stem in enumerate(stems)),
+                      shares=" ".join(f"t{k} {1 / len(names):.6f}" for k in range(len(names))), **scene)
 
 
 def hull_of(points):
@@ -153,7 +131,7 @@ def families():
 def open_box(half, high):
     corners = np.array([(x, y, z) for x in (-half, half) for y in (-half, half) for z in (0, high)], dtype=float)
     sides = ((0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4))
-    return meshes.ascii_stl(corners, np.array([t for a, b, c, d in sides for t in ((a, b, c), (a, c, d))]))
+    return meshes.ascii_stl(corners, meshes.halves(sides))
 
 
 class TenFamilies(unittest.TestCase):

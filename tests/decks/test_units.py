@@ -23,7 +23,7 @@ def hills(length):
     at = np.linspace(-4, 4, 5)
     points = np.array([(x, y, 0.125 * ((3 * i + j) % 4)) for i, x in enumerate(at) for j, y in enumerate(at)]) * length
     corners = [(5 * i + j, 5 * i + j + 5, 5 * i + j + 6, 5 * i + j + 1) for i in range(4) for j in range(4)]
-    return meshes.ascii_stl(points, [face for a, b, c, d in corners for face in ((a, b, c), (a, c, d))])
+    return meshes.ascii_stl(points, meshes.halves(corners))
 
 
 def scene(law, floor, length=1.0, mass=1.0, time=1.0, units="si", ranks=1):

@@ -69,20 +69,18 @@ Vec3 SurfaceCloud::exact_point(const Vec3& d) const {
   double best = heights_.maxCoeff(&top);
   Vec3 point = points_.row(top);
   const double near = best - 0.01 * shape_.bounding_radius;
+  using Grid = Eigen::Map<const Eigen::Array<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>>;
   for (size_t p = 0; p < shape_.patches.size(); ++p) {
-    const auto of_patch = heights_.segment(p * count, count);
-    if (of_patch.maxCoeff() < near) continue;
+    const Grid grid(heights_.data() + p * count, per_side_, per_side_);
     // On a dented face several maxima lie side by side: the highest point of each block of the grid is a
     // start.
     for (int i0 = 0; i0 < per_side_; i0 += kBlock)
       for (int j0 = 0; j0 < per_side_; j0 += kBlock) {
-        int start = -1;
-        for (int i = i0; i < std::min(i0 + kBlock, per_side_); ++i)
-          for (int j = j0; j < std::min(j0 + kBlock, per_side_); ++j)
-            if (start < 0 || of_patch[i * per_side_ + j] > of_patch[start]) start = i * per_side_ + j;
-        if (of_patch[start] < near) continue;
-        const Vec3 x =
-            ascend(shape_.patches[p], d, parameter(start / per_side_), parameter(start % per_side_));
+        int i, j;
+        const auto block =
+            grid.block(i0, j0, std::min(kBlock, per_side_ - i0), std::min(kBlock, per_side_ - j0));
+        if (block.maxCoeff(&i, &j) < near) continue;
+        const Vec3 x = ascend(shape_.patches[p], d, parameter(i0 + i), parameter(j0 + j));
         if (x.dot(d) <= best) continue;
         best = x.dot(d);
         point = x;
