@@ -272,7 +272,8 @@ Dent find_dent(const Shape& shape, const std::vector<SurfaceSample>& samples, co
   dent.excess = kinks.excess;
   if (!suspect && excess[highest] <= kNoDent * size) return dent;
 
-  const double step = 1 / (std::sqrt(static_cast<double>(samples.size() / shape.patches.size())) - 1);
+  const size_t per_patch = samples.size() / shape.patches.size();
+  const double step = 1 / (std::sqrt(static_cast<double>(per_patch)) - 1);
   const Clouds starts = choose(samples, kDentStarts);
   const Probe probe(shape, starts, step);
   SurfacePoint where;

@@ -21,8 +21,8 @@ constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr int kLeastRadiusBudget = 4;
 // The same for the proof of convexity, where no hollow is seen: without it every support is doubted.
 constexpr int kConvexBudget = 6;
-constexpr int kDeepestOnBall =
-    10;  // halvings of a patch on a ball: parameters that still fold are a sliver's
+// Halvings of a patch on a ball: parameters that still fold are a sliver's.
+constexpr int kDeepestOnBall = 10;
 constexpr double kPlaneTilt = 1e-6;     // rad: more of a tilt within a patch is no plane's round-off
 constexpr double kSurelyTurned = 1e-6;  // least over largest coefficient of a volume: far above round-off
 constexpr double kBent = 1e-3;          // over the bounding radius: a curvature worth it
@@ -205,12 +205,14 @@ Ball ball_of(const BezierPatch& patch, double size) {
   Eigen::Matrix<double, 8, 3> places;
   Eigen::Matrix<double, 8, 1> squares;
   const Vec3 middle = evaluate0(patch, 0.5, 0.5);
-  for (int k = 0; k < 8; ++k) {
-    const int at = k < 4 ? k : k + 1;
-    const Vec3 x = evaluate0(patch, 0.5 * (at / 3), 0.5 * (at % 3)) - middle;
-    places.row(k) = 2 * x.transpose();
-    squares[k] = x.squaredNorm();
-  }
+  int row = 0;
+  for (const double u : {0.0, 0.5, 1.0})
+    for (const double v : {0.0, 0.5, 1.0}) {
+      if (u == 0.5 && v == 0.5) continue;
+      const Vec3 x = evaluate0(patch, u, v) - middle;
+      places.row(row) = 2 * x.transpose();
+      squares[row++] = x.squaredNorm();
+    }
   const Vec3 to_center = places.colPivHouseholderQr().solve(squares), center = middle + to_center;
   const Ball ball{center, to_center.norm()};
   return ball.radius < kLongRadius * size && lies_on(ball, patch, size) ? ball : Ball{};
@@ -372,8 +374,8 @@ class Bounder {
         continue;
       }
       const bool bulging = is_bulging_cylinder(shape_.patches[p], shape_.bounding_radius);
-      const double known =
-          rounding(shape_.patches[p]);  // infinite of planes, which are looked at all the same
+      const double known = rounding(shape_.patches[p]);
+      // Planes, whose radius is infinite, are looked at all the same.
       const double round = std::max(known < kFarAway ? known : 0, balls_[p].radius);
       for (Cell& c : first_cells(shape_, out_.even, p)) {
         Leaf leaf{std::move(c), {}, {}};

@@ -154,7 +154,7 @@ double least_area(const std::vector<Vec3>& x, const std::array<int, 4>& q) {
     return (x[q[behind]] - x[q[k]]).cross(x[q[before]] - x[q[k]]).norm();
   };
   if (q[0] == q[1]) return at(1, 3, 2);
-  return std::min(std::min(at(0, 3, 1), at(1, 0, 2)), std::min(at(2, 1, 3), at(3, 2, 0)));
+  return std::min({at(0, 3, 1), at(1, 0, 2), at(2, 1, 3), at(3, 2, 0)});
 }
 
 // A convex polygon in a plane as quadrilaterals and triangles, those with next to no angle at a corner as two
@@ -292,6 +292,7 @@ class Rounder {
     const int n = static_cast<int>(loop.size());
     for (int k = 0; k < n; ++k) of_edge_[{loop[k], loop[(k + 1) % n]}] = f;
     std::vector<Vec3> corners;
+    corners.reserve(loop.size());
     for (const int v : loop) corners.push_back(corner(v, f));
     for (const auto& [a, b, c, d] : well_shaped(corners, size_))
       out_.push_back(flat_patch(corners[a], corners[b], corners[c], corners[d]));
