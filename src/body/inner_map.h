@@ -4,6 +4,7 @@
 #pragma once
 
 #include <array>
+#include <atomic>
 #include <memory>
 #include <mutex>
 #include <vector>
@@ -52,18 +53,28 @@ struct InnerMap {
 // sides of an opening joint have radius 0, as a crease has. Some tens of ms, 330 kB.
 InnerMap make_inner_map(const Shape& shape);
 
-// A shape's inner map, made when it is first asked for: bodies that never overlap deeply do without. Copies
+// A shape's inner map, made when it is first asked for: bodies that seldom overlap deeply do without. Copies
 // share it, and any thread may ask.
 class LazyInnerMap {
  public:
   const InnerMap& of(const Shape& shape) const {
-    std::call_once(made_->once, [&] { made_->map = make_inner_map(shape); });
+    std::call_once(made_->once, [&] {
+      made_->map = make_inner_map(shape);
+      made_->done = true;
+    });
     return made_->map;
   }
+  // Whether it is there, or has been done without so often that making it costs no more. Counts the calls.
+  bool pays() const { return made_->done || ++made_->without > kDoneWithout; }
+  bool made() const { return made_->done; }
+
+  static constexpr int kDoneWithout = 256;  // some 0.1 ms each
 
  private:
   struct Made {
     std::once_flag once;
+    std::atomic<bool> done{false};
+    std::atomic<int> without{0};
     InnerMap map;
   };
   std::shared_ptr<Made> made_ = std::make_shared<Made>();

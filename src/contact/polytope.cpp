@@ -435,11 +435,11 @@ class Search {
   }
 
   // Of a body in its own axes, lengths of the lab.
-  static Bend bend_of(const Shape& shape, const SurfacePoint& at, double scale, const Vec3& d, const Vec3& t,
-                      const Vec3& s) {
+  Bend bend_of(const Shape& shape, const SurfacePoint& at, double scale, const Vec3& d, const Vec3& t,
+               const Vec3& s) const {
     Bend bend;
     if (shape.dented() || shape.joint_slack > 0) return bend;
-    const InnerMap& map = shape.inner_map();
+    const InnerMap& map = pair_.inner_map(shape);
     if (!map.nodes.empty()) {
       const InnerNode& node = map.nodes[shape.atlas.nearest(d)];
       const double off = angle_between(node.normal, d);
@@ -744,7 +744,7 @@ PolytopeResult solve_polytope(const PairFrame& pair, const Vec3& seed, double to
     if (attempt % 2 == 1) search.let_be();
     const bool started = search.start(from);
     if (started && attempt == 0 && (pair.a->revolution.found || pair.b->revolution.found)) {
-      const bool bent = !pair.a->inner_map().nodes.empty() && !pair.b->inner_map().nodes.empty();
+      const bool bent = !pair.inner_map(*pair.a).nodes.empty() && !pair.inner_map(*pair.b).nodes.empty();
       search.run(enough, bent ? kBentBeforeRings : kBeforeRings);
       best = search.result();
       if (!best.converged && is_polar(pair, best.bracket.direction)) {

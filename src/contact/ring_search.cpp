@@ -385,8 +385,8 @@ class RingSearch {
   // Least curvature radius along `v` of a body about the direction e (both in its axes), of lengths 1: for
   // directions within `reach` of e in their plane, or, `any`, of any tangent and all directions within reach.
   // 0 where nothing is known.
-  static double least_bend(const Shape& shape, const Vec3& e, const Vec3& v, double reach, bool any) {
-    const InnerMap& map = shape.inner_map();
+  double least_bend(const Shape& shape, const Vec3& e, const Vec3& v, double reach, bool any) const {
+    const InnerMap& map = pair_.inner_map(shape);
     if (map.stretches.empty()) return 0;
     const int cell = InnerMap::cell(e);
     const double off = (e - InnerMap::middle(cell)).norm();
