@@ -7,7 +7,9 @@
 #include <cstdio>
 #include <limits>
 #include <map>
+#include <optional>
 #include <queue>
+#include <set>
 
 #include "body/mass_properties.h"
 #include "body/support.h"
@@ -51,9 +53,15 @@ constexpr double kAim = 0.97, kOutwardAim = 0.93;  // of a tolerance, left to sa
 // crowd.
 constexpr double kFirstSlide = 0.05, kFreeSlide = 0.15;
 constexpr double kPlaneShare = 0.02;  // of the tolerance: faces that are plane to this may be one
-constexpr size_t kMostFaces = 60;     // of a polyhedron with rounded edges ...
-constexpr size_t kMostFacesAtLast =
-    300;  // ... where nothing else is within the tolerance: seconds to load, and contacts are slow
+// Faces of a polyhedron with rounded edges, which bodies of a few keep whatever else would do. Of more, its
+// contacts take 3 to 5 times as long at rest as a spline's, and 3 to 10 times as they begin: splines of fewer
+// points are tried first.
+constexpr size_t kFlatFaces = 12, kMostFaces = 60;
+constexpr size_t kMostFacesAtLast = 300;  // where nothing else is within the tolerance: seconds to load
+// Its control points for every face but two: three faces meet at most corners of an eroded polyhedron, three
+// patches of 25 points at each, two of 6 along an edge.
+constexpr size_t kPointsPerFace = 194;
+constexpr double kRateGain = 0.5;  // of the power of the spans by which an error falls, from one rung to the next
 constexpr int kBisections = 14;      // of a rounding that the hull has already ...
 constexpr double kSurelyNear = 0.1;  // ... unless it is as near as this share of the tolerance
 constexpr int kRoundings = 2;        // ... whose radius is found by the distance of the first one
@@ -354,11 +362,13 @@ class HullFitter {
     int further = 0;
     for (const auto& [degree, spans] : kLadder) {
       if ((!any && spans != options_.spans) || too_many(degree, spans)) continue;
-      if (spans > 1 && any && (try_revolution() || try_polyhedron(kMostFaces) || try_round_edges()))
+      if (spans > 1 && any && (try_revolution() || try_polyhedron(kFlatFaces) || try_round_edges()))
         return best_;
       if (any && too_coarse(degree, spans)) continue;
       if (any && spans > 1 && dents_ == kMostDents) break;
-      if (any && spans > 1 && start_error_ > kFine * tolerance_ && !polynomials_may_do(even_hull)) break;
+      if (any && spans > 1 && (crystal_faces() > 0 || start_error_ > kFine * tolerance_) &&
+          !polynomials_may_do(even_hull))
+        break;
       if (try_rung(degree, spans, target)) return best_;
       if (best_.shape && further++ == kFurther) return best_;
     }
@@ -366,11 +376,13 @@ class HullFitter {
       if (!any && try_gauge(degree, options_.spans, even_hull)) return best_;
     for (const auto& [degree, spans] : kGaugeLadder) {
       if (!any || too_many(degree, spans)) break;
-      const double falls = std::pow(gauge_spans_ / double(spans), kGaugeSteepest);
-      if (gauge_spans_ > 0 && gauge_error_ * falls > tolerance_) continue;
+      if (crystal_faces() > 0 && polyhedron_points() <= points_of(degree, spans) && try_polyhedron(kMostFaces))
+        return best_;
+      if (!gauge_may_do(spans, even_hull)) continue;
       if (try_gauge(degree, spans, even_hull)) return best_;
       if (best_.shape && further++ == kFurther) break;
     }
+    if (any && crystal_faces() > 0 && !best_.shape && try_polyhedron(kMostFaces)) return best_;
     if (best_.shape) return best_;  // its convexity is measured, not proven
     if (any && options_.most_points == 0 && try_polyhedron(kMostFacesAtLast)) return best_;
     if (best_.shape) return best_;
@@ -403,10 +415,22 @@ class HullFitter {
     return false;
   }
 
-  bool too_many(int degree, int spans) const {
+  static size_t points_of(int degree, int spans) {
     const size_t size = SmoothCube::net_size(degree, spans);
-    return options_.most_points > 0 && kCubeFaces * size * size > options_.most_points;
+    return kCubeFaces * size * size;
   }
+
+  bool too_many(int degree, int spans) const {
+    return options_.most_points > 0 && points_of(degree, spans) > options_.most_points;
+  }
+
+  // Faces of a hull that is a polyhedron of up to kMostFaces, 0 where it is not.
+  size_t crystal_faces() {
+    if (!crystal_faces_) crystal_faces_ = facets(hull_, kMostFaces, face_roundoff()).size();
+    return *crystal_faces_;
+  }
+  size_t polyhedron_points() { return kPointsPerFace * (crystal_faces() - 2); }
+  double face_roundoff() const { return std::max(kSingleRoundoff, kPlaneShare * options_.tolerance); }
 
   // Whether the error so far can't fall to the tolerance by going to this rung, or the rung costs too much
   // for what it may bring.
@@ -456,13 +480,11 @@ class HullFitter {
   // The hull of a few faces with its edges rounded, as far as its corners allow: creases are dear to splines.
   // Rounded coordinates far from the origin leave faces less plane than single precision does near it.
   bool try_polyhedron(size_t most_faces) {
-    if (faces_tried_ >= most_faces) return false;
-    faces_tried_ = most_faces;
-    size_t tried = 0;
-    for (double roundoff : {std::max(kSingleRoundoff, kPlaneShare * options_.tolerance), kSingleRoundoff}) {
+    if (most_faces_tried_ >= most_faces) return false;
+    most_faces_tried_ = most_faces;
+    for (double roundoff : {face_roundoff(), kSingleRoundoff}) {
       const std::vector<HalfSpace> faces = facets(hull_, most_faces, roundoff);
-      if (faces.empty() || faces.size() == tried) continue;
-      tried = faces.size();
+      if (faces.empty() || !faces_tried_.insert(faces.size()).second) continue;
       if (try_rounded(faces)) return true;
     }
     return false;
@@ -575,14 +597,31 @@ class HullFitter {
   // What the first rung of gauge functions can reach tells soon what polynomial patches of about as many
   // points can.
   bool polynomials_may_do(const ConvexHull& even) {
-    if (gauge_spans_ == 0) {
-      GaugeFitOptions options = gauge_options();
-      const auto& [degree, spans] = kGaugeLadder[0];
-      options.least_curvature = kLeastCurvature;
-      gauge_error_ = fit_gauge(degree, spans, even, options).error * kAim * tolerance_;
-      gauge_spans_ = spans;
-    }
+    if (gauge_spans_ == 0) estimate_gauge(kGaugeLadder[0], even);
     return gauge_error_ < kPolynomialGain * tolerance_;
+  }
+
+  // What gauge functions of so many spans can reach at all.
+  void estimate_gauge(const int (&rung)[2], const ConvexHull& even) {
+    GaugeFitOptions options = gauge_options();
+    options.least_curvature = kLeastCurvature;
+    const double before = gauge_error_;
+    gauge_error_ = fit_gauge(rung[0], rung[1], even, options).error * kAim * tolerance_;
+    if (gauge_spans_ > 0 && rung[1] > gauge_spans_)
+      gauge_power_ = std::min(kGaugeSteepest, kRateGain + std::log(before / gauge_error_) /
+                                                              std::log(rung[1] / double(gauge_spans_)));
+    gauge_spans_ = rung[1];
+  }
+
+  // Whether the error of the last rung can fall to the tolerance with so many spans; the second one tells how
+  // fast it does, which is slowly where edges are sharp.
+  bool gauge_may_do(int spans, const ConvexHull& even) {
+    const auto may = [&] {
+      return gauge_spans_ == 0 || gauge_error_ * std::pow(gauge_spans_ / double(spans), gauge_power_) <= tolerance_;
+    };
+    if (may() && gauge_spans_ == kGaugeLadder[0][1] && spans > kGaugeLadder[1][1])
+      estimate_gauge(kGaugeLadder[1], even);
+    return may();
   }
 
   // More points, but sure to converge.
@@ -689,10 +728,12 @@ class HullFitter {
   double radius_ = 0, tolerance_ = 0, least_ = kFar, start_error_ = kFar;
   std::vector<NurbsSurface> start_;
   int dents_ = 0, start_degree_ = 0, start_spans_ = 0, gauge_spans_ = 0;
-  double gauge_error_ = kFar;
+  double gauge_error_ = kFar, gauge_power_ = kGaugeSteepest;
   double face_area_ = 0;    // of the hull's largest triangle, where it is about as wide in all directions
   HullDistance judged_;     // of the last body that loaded without a dent
-  size_t faces_tried_ = 0;  // of polyhedra, at the most
+  std::optional<size_t> crystal_faces_;
+  size_t most_faces_tried_ = 0;   // of polyhedra
+  std::set<size_t> faces_tried_;  // of each of them
   bool round_edges_tried_ = false, revolution_tried_ = false;
   HullFit best_;
 };
