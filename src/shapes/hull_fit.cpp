@@ -3,6 +3,7 @@
 
 #include <Eigen/Eigenvalues>
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdio>
 #include <limits>
@@ -37,6 +38,7 @@ constexpr int kMostDents = 2;    // polynomial bodies near enough but dented: no
 constexpr double kSteepest = 3;  // power of the spans by which an error falls, at the most, and with edges:
 constexpr double kGaugeSteepest = 2;   // .. of hulls for which polynomial patches were too few
 constexpr double kRaised = 2;          // largest gain of a degree: rungs that need more of it are skipped
+constexpr double kPolynomialRate = 0.4, kRaisedLater = 1.2;  // of an error's fall as the last ones tell it
 constexpr double kCurvatureShare = 3;  // least curvature over the tolerance, both relative
 constexpr double kLeastCurvature = 0.002, kMostCurvature = 0.1;
 constexpr double kGaugeCurvatures[] = {10, 3, 1};  // over the tolerance: the first that can be had
@@ -61,6 +63,7 @@ constexpr size_t kMostFacesAtLast = 300;  // where nothing else is within the to
 // Its control points for every face but two: three faces meet at most corners of an eroded polyhedron, three
 // patches of 25 points at each, two of 6 along an edge.
 constexpr size_t kPointsPerFace = 194;
+constexpr double kSharper = 0.5;   // of the tolerance: where estimates of what gauge functions can do end
 constexpr double kRateGain = 0.5;  // of the power of the spans by which an error falls, from one rung to the next
 constexpr int kBisections = 14;      // of a rounding that the hull has already ...
 constexpr double kSurelyNear = 0.1;  // ... unless it is as near as this share of the tolerance
@@ -366,7 +369,7 @@ class HullFitter {
         return best_;
       if (any && too_coarse(degree, spans)) continue;
       if (any && spans > 1 && dents_ == kMostDents) break;
-      if (any && spans > 1 && (crystal_faces() > 0 || start_error_ > kFine * tolerance_) &&
+      if (any && spans > 1 && 
           !polynomials_may_do(even_hull))
         break;
       if (try_rung(degree, spans, target)) return best_;
@@ -438,7 +441,16 @@ class HullFitter {
     if (!(start_error_ < kFar)) return spans >= kCostlySpans;
     const double gain =
         std::pow(spans / double(start_spans_), kSteepest) * (degree > start_degree_ ? kRaised : 1);
-    return start_error_ > gain * tolerance_ || (spans >= kCostlySpans && start_error_ > kNear * tolerance_);
+    if (start_error_ > gain * tolerance_ || (spans >= kCostlySpans && start_error_ > kNear * tolerance_))
+      return true;
+    if (spans < 3 || start_spans_ < 2 || !(polynomial_error_[0] < kFar)) return false;
+    // With edges, errors fall slowly: as they did, and a little faster.
+    const int last = start_spans_ - 1;
+    const double rate = kPolynomialRate + std::log(polynomial_error_[last - 1] / polynomial_error_[last]) /
+                                              std::log(start_spans_ / (start_spans_ - 1.0));
+    const double falls =
+        std::pow(start_spans_ / double(spans), rate) / (degree > start_degree_ ? kRaisedLater : 1);
+    return start_error_ * falls > tolerance_;
   }
 
   // A body of revolution of few corners, as cylinders and cones are: flat faces and straight sides stay so,
@@ -575,6 +587,7 @@ class HullFitter {
       ConvexFit freed = fit_convex(cube, fit.points, offset, free);
       if (freed.error < fit.error) fit = std::move(freed);
     }
+    polynomial_error_[spans - 1] = std::min(polynomial_error_[spans - 1], fit.error);
     const double reached = fit.error / radius_;
     const std::string kind = rung_name("", degree, spans, cube.count());
     if (fit.error > 1.5 * tolerance_) {
@@ -605,8 +618,10 @@ class HullFitter {
   void estimate_gauge(const int (&rung)[2], const ConvexHull& even) {
     GaugeFitOptions options = gauge_options();
     options.least_curvature = kLeastCurvature;
+    options.inward *= kSharper;  // so that it goes on beyond the tolerance
+    options.outward *= kSharper;
     const double before = gauge_error_;
-    gauge_error_ = fit_gauge(rung[0], rung[1], even, options).error * kAim * tolerance_;
+    gauge_error_ = fit_gauge(rung[0], rung[1], even, options).error * kSharper * kAim * tolerance_;
     if (gauge_spans_ > 0 && rung[1] > gauge_spans_)
       gauge_power_ = std::min(kGaugeSteepest, kRateGain + std::log(before / gauge_error_) /
                                                               std::log(rung[1] / double(gauge_spans_)));
@@ -727,6 +742,7 @@ class HullFitter {
   int most_points_ = 0;
   double radius_ = 0, tolerance_ = 0, least_ = kFar, start_error_ = kFar;
   std::vector<NurbsSurface> start_;
+  std::array<double, 4> polynomial_error_ = {kFar, kFar, kFar, kFar};  // by spans - 1
   int dents_ = 0, start_degree_ = 0, start_spans_ = 0, gauge_spans_ = 0;
   double gauge_error_ = kFar, gauge_power_ = kGaugeSteepest;
   double face_area_ = 0;    // of the hull's largest triangle, where it is about as wide in all directions
