@@ -25,6 +25,7 @@ constexpr double kNearly = 1.02;    // of the distances wanted: from there on th
 constexpr double kRoom = 1.005;     // ... of what the distances wanted, or this times those reached, leave
 constexpr double kMostChange = 0.5;  // share of the gauge that a step may change
 constexpr double kGap = 0.01;       // share of the allowed error: so near to the least one it ends
+constexpr double kFarGap = 0.04;    // .. where that one is too far
 constexpr double kForms = 0.5;      // weight of log det of curvature, that of a distance being 1
 constexpr double kInside = 0.97;    // of the way to a bound
 constexpr double kShortest = 1e-4;  // steps: nothing more is to be had
@@ -153,7 +154,8 @@ class InteriorPoint {
       if (!descend()) break;
       refer();
       met = worst() <= 1 && is_convex();
-      if (terms_ * mean_product() < kGap * allowed_) break;
+      const double gap = terms_ * mean_product();
+      if (gap < kGap * allowed_ || (gap < kFarGap * allowed_ && allowed_ - gap > kNearly)) break;
     }
     if (worst() <= kNearly && is_convex()) centre();
     gauge_ = cube_.tidied(gauge_);

@@ -44,6 +44,7 @@ constexpr double kLeastCurvature = 0.002, kMostCurvature = 0.1;
 constexpr double kGaugeCurvatures[] = {10, 3, 1};  // over the tolerance: the first that can be had
 // Least height of a cap of curvature 1 over a triangle of area 1: the squared radius of its circle, halved.
 const double kTriangleBulge = 2 / (3 * std::sqrt(3.0));
+constexpr double kGaugeHope = 1.03;  // times the tolerance, of an error to be expected: not worth a try
 constexpr double kGaugeGain = 1.4;  // largest fall of the error by asking for less curvature
 constexpr int kFurther = 2;         // rungs tried beyond a body that is near enough, but not proven convex
 constexpr double kSurelyTooCoarse = 3;  // times the tolerance: no freer fit is tried
@@ -345,6 +346,21 @@ std::string percent(double x) {
   return text;
 }
 
+// How an error falls as a power of the number of spans, from the last two it was found for.
+class ErrorFall {
+ public:
+  void add(int spans, double error) {
+    if (spans_ > 0 && spans > spans_) power_ = std::log(error_ / error) / std::log(spans / double(spans_));
+    spans_ = spans;
+    error_ = error;
+  }
+  double at(int spans) const { return spans > spans_ && power_ < 1e9 ? error_ * std::pow(spans_ / double(spans), power_) : 0; }
+
+ private:
+  int spans_ = 0;
+  double error_ = 0, power_ = 1e10;
+};
+
 class HullFitter {
  public:
   HullFitter(const ConvexHull& hull, const HullFitOptions& options, double thin, double volume_error)
@@ -365,7 +381,7 @@ class HullFitter {
     int further = 0;
     for (const auto& [degree, spans] : kLadder) {
       if ((!any && spans != options_.spans) || too_many(degree, spans)) continue;
-      if (spans > 1 && any && (try_revolution() || try_polyhedron(kFlatFaces) || try_round_edges()))
+      if (spans > 1 && any && (try_revolution() || try_faces(points_of(degree, spans))))
         return best_;
       if (any && too_coarse(degree, spans)) continue;
       if (any && spans > 1 && dents_ == kMostDents) break;
@@ -379,13 +395,12 @@ class HullFitter {
       if (!any && try_gauge(degree, options_.spans, even_hull)) return best_;
     for (const auto& [degree, spans] : kGaugeLadder) {
       if (!any || too_many(degree, spans)) break;
-      if (crystal_faces() > 0 && polyhedron_points() <= points_of(degree, spans) && try_polyhedron(kMostFaces))
-        return best_;
+      if (try_faces(points_of(degree, spans))) return best_;
       if (!gauge_may_do(spans, even_hull)) continue;
       if (try_gauge(degree, spans, even_hull)) return best_;
       if (best_.shape && further++ == kFurther) break;
     }
-    if (any && crystal_faces() > 0 && !best_.shape && try_polyhedron(kMostFaces)) return best_;
+    if (any && !best_.shape && options_.most_points == 0 && try_faces(kMostFaces * kPointsPerFace)) return best_;
     if (best_.shape) return best_;  // its convexity is measured, not proven
     if (any && options_.most_points == 0 && try_polyhedron(kMostFacesAtLast)) return best_;
     if (best_.shape) return best_;
@@ -432,12 +447,11 @@ class HullFitter {
     if (!crystal_faces_) crystal_faces_ = facets(hull_, kMostFaces, face_roundoff()).size();
     return *crystal_faces_;
   }
-  size_t polyhedron_points() { return kPointsPerFace * (crystal_faces() - 2); }
   double face_roundoff() const { return std::max(kSingleRoundoff, kPlaneShare * options_.tolerance); }
 
   // Whether the error so far can't fall to the tolerance by going to this rung, or the rung costs too much
   // for what it may bring.
-  bool too_coarse(int degree, int spans) const {
+  bool too_coarse(int degree, int spans) {
     if (!(start_error_ < kFar)) return spans >= kCostlySpans;
     const double gain =
         std::pow(spans / double(start_spans_), kSteepest) * (degree > start_degree_ ? kRaised : 1);
@@ -445,12 +459,20 @@ class HullFitter {
       return true;
     if (spans < 3 || start_spans_ < 2 || !(polynomial_error_[0] < kFar)) return false;
     // With edges, errors fall slowly: as they did, and a little faster.
+    if (dear_crystal(degree, spans)) return true;
     const int last = start_spans_ - 1;
     const double rate = kPolynomialRate + std::log(polynomial_error_[last - 1] / polynomial_error_[last]) /
                                               std::log(start_spans_ / (start_spans_ - 1.0));
     const double falls =
         std::pow(start_spans_ / double(spans), rate) / (degree > start_degree_ ? kRaisedLater : 1);
-    return start_error_ * falls > tolerance_;
+    return polynomial_error_[last] * falls > tolerance_;
+  }
+
+  // Whether gauge functions do, within a second, what this rung may do for a crystal with two thirds of the
+  // points or more.
+  bool dear_crystal(int degree, int spans) {
+    return crystal_faces() > 0 && gauge_error_ <= tolerance_ &&
+           3 * points_of(degree, spans) > 2 * points_of(kGaugeLadder[0][0], kGaugeLadder[0][1]);
   }
 
   // A body of revolution of few corners, as cylinders and cones are: flat faces and straight sides stay so,
@@ -489,6 +511,12 @@ class HullFitter {
     return false;
   }
 
+  // Polyhedra of a few faces, or of no more control points than these.
+  bool try_faces(size_t points) {
+    const size_t faces = std::clamp(points / kPointsPerFace + 2, kFlatFaces, kMostFaces);
+    return try_polyhedron(faces) || try_round_edges(faces);
+  }
+
   // The hull of a few faces with its edges rounded, as far as its corners allow: creases are dear to splines.
   // Rounded coordinates far from the origin leave faces less plane than single precision does near it.
   bool try_polyhedron(size_t most_faces) {
@@ -504,10 +532,10 @@ class HullFitter {
 
   // A polyhedron whose edges are round already, by more than the tolerance allows: of a rounding too small
   // the body stands out of the hull, of one too large it stays behind. Bisection to where both are equal.
-  bool try_round_edges() {
-    if (round_edges_tried_) return false;
-    round_edges_tried_ = true;
-    for (const std::vector<HalfSpace>& faces : large_faces(hull_)) {
+  bool try_round_edges(size_t most_faces) {
+    if (!large_faces_) large_faces_ = large_faces(hull_);
+    for (const std::vector<HalfSpace>& faces : *large_faces_) {
+      if (faces.size() > most_faces || !round_edges_tried_.insert(faces.size()).second) continue;
       double low = 0, high = kFar, least = kFar;
       for (const HalfSpace& f : faces) high = std::min(high, f.offset - f.normal.dot(mass_.center));
       std::vector<NurbsSurface> best;
@@ -587,23 +615,28 @@ class HullFitter {
       ConvexFit freed = fit_convex(cube, fit.points, offset, free);
       if (freed.error < fit.error) fit = std::move(freed);
     }
-    polynomial_error_[spans - 1] = std::min(polynomial_error_[spans - 1], fit.error);
     const double reached = fit.error / radius_;
     const std::string kind = rung_name("", degree, spans, cube.count());
     if (fit.error > 1.5 * tolerance_) {
+      polynomial_error_[spans - 1] = std::min(polynomial_error_[spans - 1], fit.error);
       say(kind + (fit.error < kFar ? ": off by about " + percent(reached) : ": not convex"));
       if (fit.error < kFar) least_ = std::min(least_, reached);
       return false;
     }
+    double certified = 0;
     bool accepted = false;
     const auto accept = [&](const ConvexFit& found) {
       std::vector<NurbsSurface> body = cube.surfaces(found.points);
       transform(body, frame_.from, frame_.center);
       const bool good = judge(std::move(body), kind);
+      if (certified == 0) certified = judged_.worst();
       accepted = accepted || good;
       return good;
     };
-    if (accept(fit) || fit.error <= tolerance_) raise_curvature(cube, fit, offset, free, accept);
+    const bool good = accept(fit);
+    double& error = polynomial_error_[spans - 1];
+    error = std::min(error, std::max(fit.error, certified));
+    if (good || fit.error <= tolerance_) raise_curvature(cube, fit, offset, free, accept);
     return accepted;
   }
 
@@ -645,15 +678,19 @@ class HullFitter {
     most_points_ = std::max(most_points_, count);
     const std::string kind = rung_name("rational ", degree, spans, count);
     GaugeFitOptions options = gauge_options();
-    for (double share : kGaugeCurvatures) {
+    for (size_t which = 0; which < std::size(kGaugeCurvatures); ++which) {
+      const double share = kGaugeCurvatures[which];
+      ErrorFall& fall = gauge_fall_[which];
+      if (fall.at(spans) > kGaugeHope * tolerance_) continue;  // as curvature lets it fall
       options.least_curvature = std::clamp(share * tolerance_ / radius_, kLeastCurvature, kMostCurvature);
       // A face bulges by no more than from its corners, as low as they may be, to as high as it may be.
       const double bulge = kTriangleBulge * options.least_curvature * face_area_;
-      if (share > kGaugeCurvatures[2] && bulge > 2 * tolerance_ / radius_) continue;
+      if (which + 1 < std::size(kGaugeCurvatures) && bulge > 2 * tolerance_ / radius_) continue;
       for (int pass = 0; pass < 2; ++pass) {  // what certifies further away is asked to be nearer
         GaugeFit fit = fit_gauge(degree, spans, even, options);
         gauge_error_ = fit.error * kAim * tolerance_;
         gauge_spans_ = spans;
+        if (pass == 0) fall.add(spans, gauge_error_);
         if (fit.error > 1 / kAim) break;  // the certificate decides
         transform(fit.surfaces, frame_.from, frame_.center);
         if (judge(std::move(fit.surfaces), kind)) return true;
@@ -747,10 +784,13 @@ class HullFitter {
   double gauge_error_ = kFar, gauge_power_ = kGaugeSteepest;
   double face_area_ = 0;    // of the hull's largest triangle, where it is about as wide in all directions
   HullDistance judged_;     // of the last body that loaded without a dent
+  ErrorFall gauge_fall_[std::size(kGaugeCurvatures)];
   std::optional<size_t> crystal_faces_;
   size_t most_faces_tried_ = 0;   // of polyhedra
   std::set<size_t> faces_tried_;  // of each of them
-  bool round_edges_tried_ = false, revolution_tried_ = false;
+  std::optional<std::vector<std::vector<HalfSpace>>> large_faces_;
+  std::set<size_t> round_edges_tried_;  // numbers of faces
+  bool revolution_tried_ = false;
   HullFit best_;
 };
 
