@@ -17,11 +17,11 @@ using Vector = Eigen::VectorXd;
 using Sparse = Eigen::SparseMatrix<double>;
 
 constexpr int kSteps = 60;
-constexpr int kCentreSteps = 8;     // at the most ...
+constexpr int kCentreSteps = 12;    // at the most ...
 constexpr double kCentred = 0.1;    // ... and until no slack changes by more than this share
 constexpr int kDenser = 3;          // times that places are added where there are dents between others
 constexpr double kFirstRoom = 1.5;  // allowed error over that of the ball the fit starts from
-constexpr double kNearly = 1.02;    // of the distances wanted: from there on the centre is looked for ...
+constexpr double kNearly = 1.03;    // of the distances wanted: from there on the centre is looked for ...
 constexpr double kRoom = 1.005;     // ... of what the distances wanted, or this times those reached, leave
 constexpr double kMostChange = 0.5;  // share of the gauge that a step may change
 constexpr double kGap = 0.01;       // share of the allowed error: so near to the least one it ends
@@ -157,7 +157,7 @@ class InteriorPoint {
       const double gap = terms_ * mean_product();
       if (gap < kGap * allowed_ || (gap < kFarGap * allowed_ && allowed_ - gap > kNearly)) break;
     }
-    if (worst() <= kNearly && is_convex()) centre();
+    if (worst() <= kNearly) centre();
     gauge_ = cube_.tidied(gauge_);
     return {cube_.surfaces(gauge_), worst()};
   }

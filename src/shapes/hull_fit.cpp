@@ -31,6 +31,7 @@ constexpr int kLadder[][2] = {{3, 1}, {4, 1}, {3, 2}, {4, 2}, {3, 3}, {4, 3}, {3
 constexpr int kGaugeLadder[][2] = {{4, 4}, {4, 6}, {4, 8}, {4, 10}, {4, 12}};
 constexpr int kCostlySpans = 4;  // polynomial fits take 10 s from here on ...
 constexpr double kNear = 1.5;    // ... and need a last error of less than this times the tolerance
+constexpr double kCrystalNear = 1.3;  // ... and for a higher degree of crystals
 constexpr double kFine = 4;      // times the tolerance is the first error where many points are expected
 constexpr double kPolynomialGain =
     1.6;                         // error of the first gauge function over polynomial ones', at the most
@@ -65,6 +66,10 @@ constexpr size_t kMostFacesAtLast = 300;  // where nothing else is within the to
 // patches of 25 points at each, two of 6 along an edge.
 constexpr size_t kPointsPerFace = 194;
 constexpr double kSharper = 0.5;   // of the tolerance: where estimates of what gauge functions can do end
+// Spans from which a gauge function takes 5 s, and what times the tolerance the last error must be where a
+// crystal's polyhedron does.
+constexpr int kCostlyGauge = 10;
+constexpr double kCostlyNear = 1.1;
 constexpr double kRateGain = 0.5;  // of the power of the spans by which an error falls, from one rung to the next
 constexpr int kBisections = 14;      // of a rounding that the hull has already ...
 constexpr double kSurelyNear = 0.1;  // ... unless it is as near as this share of the tolerance
@@ -452,6 +457,7 @@ class HullFitter {
   // Whether the error so far can't fall to the tolerance by going to this rung, or the rung costs too much
   // for what it may bring.
   bool too_coarse(int degree, int spans) {
+    if (spans > 1 && dear_crystal(degree, spans)) return true;
     if (!(start_error_ < kFar)) return spans >= kCostlySpans;
     const double gain =
         std::pow(spans / double(start_spans_), kSteepest) * (degree > start_degree_ ? kRaised : 1);
@@ -459,7 +465,6 @@ class HullFitter {
       return true;
     if (spans < 3 || start_spans_ < 2 || !(polynomial_error_[0] < kFar)) return false;
     // With edges, errors fall slowly: as they did, and a little faster.
-    if (dear_crystal(degree, spans)) return true;
     const int last = start_spans_ - 1;
     const double rate = kPolynomialRate + std::log(polynomial_error_[last - 1] / polynomial_error_[last]) /
                                               std::log(start_spans_ / (start_spans_ - 1.0));
@@ -468,11 +473,12 @@ class HullFitter {
     return polynomial_error_[last] * falls > tolerance_;
   }
 
-  // Whether gauge functions do, within a second, what this rung may do for a crystal with two thirds of the
-  // points or more.
+  // Whether this rung is left out for a crystal, whose edges polynomials round but slowly: where its lower
+  // degree was far off, and where gauge functions do, within a second, with at most half as many points more.
   bool dear_crystal(int degree, int spans) {
-    return crystal_faces() > 0 && gauge_error_ <= tolerance_ &&
-           3 * points_of(degree, spans) > 2 * points_of(kGaugeLadder[0][0], kGaugeLadder[0][1]);
+    if (crystal_faces() == 0 || gauge_error_ > tolerance_) return false;
+    if (degree > 3 && polynomial_error_[spans - 1] > kCrystalNear * tolerance_) return true;
+    return 3 * points_of(degree, spans) > 2 * points_of(kGaugeLadder[0][0], kGaugeLadder[0][1]);
   }
 
   // A body of revolution of few corners, as cylinders and cones are: flat faces and straight sides stay so,
@@ -664,6 +670,7 @@ class HullFitter {
   // Whether the error of the last rung can fall to the tolerance with so many spans; the second one tells how
   // fast it does, which is slowly where edges are sharp.
   bool gauge_may_do(int spans, const ConvexHull& even) {
+    if (crystal_faces() > 0 && spans >= kCostlyGauge && gauge_error_ > kCostlyNear * tolerance_) return false;
     const auto may = [&] {
       return gauge_spans_ == 0 || gauge_error_ * std::pow(gauge_spans_ / double(spans), gauge_power_) <= tolerance_;
     };
