@@ -17,21 +17,21 @@ using Vector = Eigen::VectorXd;
 using Sparse = Eigen::SparseMatrix<double>;
 
 constexpr int kSteps = 60;
-constexpr int kCentreSteps = 12;    // at the most ...
-constexpr double kCentred = 0.1;    // ... and until no slack changes by more than this share
-constexpr int kDenser = 3;          // times that places are added where there are dents between others
-constexpr double kFirstRoom = 1.5;  // allowed error over that of the ball the fit starts from
-constexpr double kNearly = 1.03;    // of the distances wanted: from there on the centre is looked for ...
-constexpr double kRoom = 1.005;     // ... of what the distances wanted, or this times those reached, leave
+constexpr int kCentreSteps = 12;     // at the most ...
+constexpr double kCentred = 0.1;     // ... and until no slack changes by more than this share
+constexpr int kDenser = 3;           // times that places are added where there are dents between others
+constexpr double kFirstRoom = 1.5;   // allowed error over that of the ball the fit starts from
+constexpr double kNearly = 1.03;     // of the distances wanted: from there on the centre is looked for ...
+constexpr double kRoom = 1.005;      // ... of what the distances wanted, or this times those reached, leave
 constexpr double kMostChange = 0.5;  // share of the gauge that a step may change
-constexpr double kGap = 0.01;       // share of the allowed error: so near to the least one it ends
-constexpr double kFarGap = 0.04;    // .. where that one is too far
-constexpr double kForms = 0.5;      // weight of log det of curvature, that of a distance being 1
-constexpr double kInside = 0.97;    // of the way to a bound
-constexpr double kShortest = 1e-4;  // steps: nothing more is to be had
-constexpr double kReserve = 0.25;   // share of the least curvature that is wanted between places
-constexpr double kNewSlack = 0.1;   // of a place added, over its form's trace
-constexpr double kRegular = 1e-9;   // of the conditions' block of the matrix
+constexpr double kGap = 0.01;        // share of the allowed error: so near to the least one it ends
+constexpr double kFarGap = 0.04;     // .. where that one is too far
+constexpr double kForms = 0.5;       // weight of log det of curvature, that of a distance being 1
+constexpr double kInside = 0.97;     // of the way to a bound
+constexpr double kShortest = 1e-4;   // steps: nothing more is to be had
+constexpr double kReserve = 0.25;    // share of the least curvature that is wanted between places
+constexpr double kNewSlack = 0.1;    // of a place added, over its form's trace
+constexpr double kRegular = 1e-9;    // of the conditions' block of the matrix
 
 // A bound's slack and multiplier, the residual of the slack, changes of both in a step, and the product of
 // those that the first, affine step would make.
@@ -98,7 +98,7 @@ class InteriorPoint {
   using Local = Eigen::Matrix<double, kLocal, 1>;
   using Shares = Eigen::Matrix<double, kLocal, 6>;  // in a Jet
 
-  struct Vertex : Ray {  // of the hull, where the body may be inside
+  struct Vertex : Ray {                       // of the hull, where the body may be inside
     Eigen::Matrix<double, kLocal, 3> shares;  // in g, g_a, g_b
     double wanted;
     Slack distance;
@@ -136,9 +136,7 @@ class InteriorPoint {
 
  public:
   InteriorPoint(int spans, const ConvexHull& hull, const GaugeFitOptions& options)
-      : cube_(kDegree, spans, CubeKind::gauge),
-        options_(options),
-        places_(spans == 1 ? 13 : kDegree + 5) {
+      : cube_(kDegree, spans, CubeKind::gauge), options_(options), places_(spans == 1 ? 13 : kDegree + 5) {
     make_places(hull);
     for (const Vec3& v : hull.mesh().points) add_vertex(v);
     make_matrix();
@@ -228,7 +226,6 @@ class InteriorPoint {
   Mat2 form(const Jet& j, const Place& s) const {
     return second_form(j) - options_.least_curvature * s.first;
   }
-
 
   // First forms and normals of the present body: held in a step.
   void refer() {
@@ -329,7 +326,8 @@ class InteriorPoint {
   double mean_product(double primal = 0, double dual = 0) {
     double sum = 0;
     for_slacks([&](const Slack& c) { sum += (c.s + primal * c.ds) * (c.z + dual * c.dz); });
-    for_forms([&](const FormSlack& c) { sum += (c.s + primal * c.ds).cwiseProduct(c.z + dual * c.dz).sum(); });
+    for_forms(
+        [&](const FormSlack& c) { sum += (c.s + primal * c.ds).cwiseProduct(c.z + dual * c.dz).sum(); });
     return sum / terms_;
   }
 
@@ -444,8 +442,7 @@ class InteriorPoint {
     const Mat2 x = c.s.inverse();
     const Mat2& z = c.z;
     const double b00 = x(0, 0) * z(0, 0), b10 = x(0, 1) * z(0, 0) + x(0, 0) * z(0, 1),
-                 b20 = x(0, 1) * z(0, 1),
-                 b11 = x(1, 1) * z(0, 0) + 2 * x(0, 1) * z(0, 1) + x(0, 0) * z(1, 1),
+                 b20 = x(0, 1) * z(0, 1), b11 = x(1, 1) * z(0, 0) + 2 * x(0, 1) * z(0, 1) + x(0, 0) * z(1, 1),
                  b21 = x(1, 1) * z(0, 1) + x(0, 1) * z(1, 1), b22 = x(1, 1) * z(1, 1);
     const double l00 = std::sqrt(std::max(b00, 1e-300)), l10 = b10 / l00, l20 = b20 / l00;
     const double l11 = std::sqrt(std::max(b11 - l10 * l10, 1e-300)), l21 = (b21 - l20 * l10) / l11;
@@ -577,11 +574,13 @@ class InteriorPoint {
       const int b = static_cast<int>(p) % spans, a = static_cast<int>(p) / spans % spans,
                 f = static_cast<int>(p) / (spans * spans);
       const Local net = local(gauge_, piece);
-      const Eigen::Map<const Eigen::Matrix<double, kDegree + 1, kDegree + 1, Eigen::RowMajor>> square(net.data());
+      const Eigen::Map<const Eigen::Matrix<double, kDegree + 1, kDegree + 1, Eigen::RowMajor>> square(
+          net.data());
       for (int j = 0; j < n; ++j) {
         const SmoothCube::Basis& v = bases[b * n + j];
         using Line = Eigen::Matrix<double, kDegree + 1, 1>;
-        const Line value = square * Eigen::Map<const Line>(v.value), slope = square * Eigen::Map<const Line>(v.slope),
+        const Line value = square * Eigen::Map<const Line>(v.value),
+                   slope = square * Eigen::Map<const Line>(v.slope),
                    bend = square * Eigen::Map<const Line>(v.bend);
         for (int i = 0; i < n; ++i) {
           if (i % 2 == 0 && j % 2 == 0) continue;

@@ -29,16 +29,16 @@ namespace {
 // functions.
 constexpr int kLadder[][2] = {{3, 1}, {4, 1}, {3, 2}, {4, 2}, {3, 3}, {4, 3}, {3, 4}};
 constexpr int kGaugeLadder[][2] = {{4, 4}, {4, 6}, {4, 8}, {4, 10}, {4, 12}};
-constexpr int kCostlySpans = 4;  // polynomial fits take 10 s from here on ...
-constexpr double kNear = 1.5;    // ... and need a last error of less than this times the tolerance
+constexpr int kCostlySpans = 4;       // polynomial fits take 10 s from here on ...
+constexpr double kNear = 1.5;         // ... and need a last error of less than this times the tolerance
 constexpr double kCrystalNear = 1.3;  // ... and for a higher degree of crystals
-constexpr double kFine = 4;      // times the tolerance is the first error where many points are expected
+constexpr double kFine = 4;           // times the tolerance is the first error where many points are expected
 constexpr double kPolynomialGain =
     1.6;                         // error of the first gauge function over polynomial ones', at the most
 constexpr int kMostDents = 2;    // polynomial bodies near enough but dented: no more are tried then
 constexpr double kSteepest = 3;  // power of the spans by which an error falls, at the most, and with edges:
-constexpr double kGaugeSteepest = 2;   // .. of hulls for which polynomial patches were too few
-constexpr double kRaised = 2;          // largest gain of a degree: rungs that need more of it are skipped
+constexpr double kGaugeSteepest = 2;  // .. of hulls for which polynomial patches were too few
+constexpr double kRaised = 2;         // largest gain of a degree: rungs that need more of it are skipped
 constexpr double kPolynomialRate = 0.4, kRaisedLater = 1.2;  // of an error's fall as the last ones tell it
 constexpr double kCurvatureShare = 3;  // least curvature over the tolerance, both relative
 constexpr double kLeastCurvature = 0.002, kMostCurvature = 0.1;
@@ -46,8 +46,8 @@ constexpr double kGaugeCurvatures[] = {10, 3, 1};  // over the tolerance: the fi
 // Least height of a cap of curvature 1 over a triangle of area 1: the squared radius of its circle, halved.
 const double kTriangleBulge = 2 / (3 * std::sqrt(3.0));
 constexpr double kGaugeHope = 1.03;  // times the tolerance, of an error to be expected: not worth a try
-constexpr double kGaugeGain = 1.4;  // largest fall of the error by asking for less curvature
-constexpr int kFurther = 2;         // rungs tried beyond a body that is near enough, but not proven convex
+constexpr double kGaugeGain = 1.4;   // largest fall of the error by asking for less curvature
+constexpr int kFurther = 2;          // rungs tried beyond a body that is near enough, but not proven convex
 constexpr double kSurelyTooCoarse = 3;  // times the tolerance: no freer fit is tried
 // A fit that aims at far less than it can reach weighs distances so heavily that it loses convexity: the aim
 // falls from kFirstAim (of the radius) with what has been reached.
@@ -65,12 +65,13 @@ constexpr size_t kMostFacesAtLast = 300;  // where nothing else is within the to
 // Its control points for every face but two: three faces meet at most corners of an eroded polyhedron, three
 // patches of 25 points at each, two of 6 along an edge.
 constexpr size_t kPointsPerFace = 194;
-constexpr double kSharper = 0.5;   // of the tolerance: where estimates of what gauge functions can do end
+constexpr double kSharper = 0.5;  // of the tolerance: where estimates of what gauge functions can do end
 // Spans from which a gauge function takes 5 s, and what times the tolerance the last error must be where a
 // crystal's polyhedron does.
 constexpr int kCostlyGauge = 10;
 constexpr double kCostlyNear = 1.1;
-constexpr double kRateGain = 0.5;  // of the power of the spans by which an error falls, from one rung to the next
+constexpr double kRateGain =
+    0.5;  // of the power of the spans by which an error falls, from one rung to the next
 constexpr int kBisections = 14;      // of a rounding that the hull has already ...
 constexpr double kSurelyNear = 0.1;  // ... unless it is as near as this share of the tolerance
 constexpr int kRoundings = 2;        // ... whose radius is found by the distance of the first one
@@ -359,7 +360,9 @@ class ErrorFall {
     spans_ = spans;
     error_ = error;
   }
-  double at(int spans) const { return spans > spans_ && power_ < 1e9 ? error_ * std::pow(spans_ / double(spans), power_) : 0; }
+  double at(int spans) const {
+    return spans > spans_ && power_ < 1e9 ? error_ * std::pow(spans_ / double(spans), power_) : 0;
+  }
 
  private:
   int spans_ = 0;
@@ -386,13 +389,10 @@ class HullFitter {
     int further = 0;
     for (const auto& [degree, spans] : kLadder) {
       if ((!any && spans != options_.spans) || too_many(degree, spans)) continue;
-      if (spans > 1 && any && (try_revolution() || try_faces(points_of(degree, spans))))
-        return best_;
+      if (spans > 1 && any && (try_revolution() || try_faces(points_of(degree, spans)))) return best_;
       if (any && too_coarse(degree, spans)) continue;
       if (any && spans > 1 && dents_ == kMostDents) break;
-      if (any && spans > 1 && 
-          !polynomials_may_do(even_hull))
-        break;
+      if (any && spans > 1 && !polynomials_may_do(even_hull)) break;
       if (try_rung(degree, spans, target)) return best_;
       if (best_.shape && further++ == kFurther) return best_;
     }
@@ -405,7 +405,8 @@ class HullFitter {
       if (try_gauge(degree, spans, even_hull)) return best_;
       if (best_.shape && further++ == kFurther) break;
     }
-    if (any && !best_.shape && options_.most_points == 0 && try_faces(kMostFaces * kPointsPerFace)) return best_;
+    if (any && !best_.shape && options_.most_points == 0 && try_faces(kMostFaces * kPointsPerFace))
+      return best_;
     if (best_.shape) return best_;  // its convexity is measured, not proven
     if (any && options_.most_points == 0 && try_polyhedron(kMostFacesAtLast)) return best_;
     if (best_.shape) return best_;
@@ -463,14 +464,15 @@ class HullFitter {
         std::pow(spans / double(start_spans_), kSteepest) * (degree > start_degree_ ? kRaised : 1);
     if (start_error_ > gain * tolerance_ || (spans >= kCostlySpans && start_error_ > kNear * tolerance_))
       return true;
-    if (spans < 3 || start_spans_ < 2 || !(polynomial_error_[0] < kFar)) return false;
     // With edges, errors fall slowly: as they did, and a little faster.
-    const int last = start_spans_ - 1;
-    const double rate = kPolynomialRate + std::log(polynomial_error_[last - 1] / polynomial_error_[last]) /
-                                              std::log(start_spans_ / (start_spans_ - 1.0));
-    const double falls =
-        std::pow(start_spans_ / double(spans), rate) / (degree > start_degree_ ? kRaisedLater : 1);
-    return polynomial_error_[last] * falls > tolerance_;
+    int last = spans;
+    while (last > 1 && !(polynomial_error_[last - 1] < kFar)) --last;
+    if (spans < 3 || last < 2 || !(polynomial_error_[last - 2] < kFar)) return false;
+    const double now = polynomial_error_[last - 1], before = polynomial_error_[last - 2];
+    const double rate =
+        kPolynomialRate + std::max(0.0, std::log(before / now) / std::log(last / (last - 1.0)));
+    const double raised = degree > start_degree_ ? kRaisedLater : 1;
+    return now * std::pow(last / double(spans), rate) > raised * tolerance_;
   }
 
   // Whether this rung is left out for a crystal, whose edges polynomials round but slowly: where its lower
@@ -672,7 +674,8 @@ class HullFitter {
   bool gauge_may_do(int spans, const ConvexHull& even) {
     if (crystal_faces() > 0 && spans >= kCostlyGauge && gauge_error_ > kCostlyNear * tolerance_) return false;
     const auto may = [&] {
-      return gauge_spans_ == 0 || gauge_error_ * std::pow(gauge_spans_ / double(spans), gauge_power_) <= tolerance_;
+      return gauge_spans_ == 0 ||
+             gauge_error_ * std::pow(gauge_spans_ / double(spans), gauge_power_) <= tolerance_;
     };
     if (may() && gauge_spans_ == kGaugeLadder[0][1] && spans > kGaugeLadder[1][1])
       estimate_gauge(kGaugeLadder[1], even);
@@ -789,8 +792,8 @@ class HullFitter {
   std::array<double, 4> polynomial_error_ = {kFar, kFar, kFar, kFar};  // by spans - 1
   int dents_ = 0, start_degree_ = 0, start_spans_ = 0, gauge_spans_ = 0;
   double gauge_error_ = kFar, gauge_power_ = kGaugeSteepest;
-  double face_area_ = 0;    // of the hull's largest triangle, where it is about as wide in all directions
-  HullDistance judged_;     // of the last body that loaded without a dent
+  double face_area_ = 0;  // of the hull's largest triangle, where it is about as wide in all directions
+  HullDistance judged_;   // of the last body that loaded without a dent
   ErrorFall gauge_fall_[std::size(kGaugeCurvatures)];
   std::optional<size_t> crystal_faces_;
   size_t most_faces_tried_ = 0;   // of polyhedra
