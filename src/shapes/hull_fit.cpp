@@ -70,8 +70,9 @@ constexpr double kSharper = 0.5;  // of the tolerance: where estimates of what g
 // crystal's polyhedron does.
 constexpr int kCostlyGauge = 10;
 constexpr double kCostlyNear = 1.1;
-constexpr double kRateGain =
-    0.5;  // of the power of the spans by which an error falls, from one rung to the next
+constexpr double kEstimate = 1.1;  // times the tolerance, as estimates are 5 % off
+// Growth of the power of the spans by which an error falls, from two rungs to the next.
+constexpr double kRateGain = 1;
 constexpr int kBisections = 14;      // of a rounding that the hull has already ...
 constexpr double kSurelyNear = 0.1;  // ... unless it is as near as this share of the tolerance
 constexpr int kRoundings = 2;        // ... whose radius is found by the distance of the first one
@@ -521,7 +522,8 @@ class HullFitter {
 
   // Polyhedra of a few faces, or of no more control points than these.
   bool try_faces(size_t points) {
-    const size_t faces = std::clamp(points / kPointsPerFace + 2, kFlatFaces, kMostFaces);
+    size_t faces = std::clamp(points / kPointsPerFace + 2, kFlatFaces, kMostFaces);
+    if (options_.most_points > 0) faces = std::min(faces, options_.most_points / kPointsPerFace + 2);
     return try_polyhedron(faces) || try_round_edges(faces);
   }
 
@@ -664,9 +666,14 @@ class HullFitter {
     const double before = gauge_error_;
     gauge_error_ = fit_gauge(rung[0], rung[1], even, options).error * kSharper * kAim * tolerance_;
     if (gauge_spans_ > 0 && rung[1] > gauge_spans_)
-      gauge_power_ = std::min(kGaugeSteepest, kRateGain + std::log(before / gauge_error_) /
-                                                              std::log(rung[1] / double(gauge_spans_)));
+      gauge_power_ = kRateGain + std::log(before / gauge_error_) / std::log(rung[1] / double(gauge_spans_));
     gauge_spans_ = rung[1];
+    if (gauge_error_ <= tolerance_) return;
+    const int count = SmoothCube(rung[0], rung[1]).count();
+    most_points_ = std::max(most_points_, count);
+    least_ = std::min(least_, gauge_error_ / radius_);
+    say(rung_name("rational ", rung[0], rung[1], count) + ": off by about " +
+        percent(gauge_error_ / radius_) + " at the least");
   }
 
   // Whether the error of the last rung can fall to the tolerance with so many spans; the second one tells how
@@ -674,8 +681,8 @@ class HullFitter {
   bool gauge_may_do(int spans, const ConvexHull& even) {
     if (crystal_faces() > 0 && spans >= kCostlyGauge && gauge_error_ > kCostlyNear * tolerance_) return false;
     const auto may = [&] {
-      return gauge_spans_ == 0 ||
-             gauge_error_ * std::pow(gauge_spans_ / double(spans), gauge_power_) <= tolerance_;
+      const double falls = std::pow(gauge_spans_ / double(spans), gauge_power_);
+      return gauge_spans_ == 0 || gauge_error_ * falls <= kEstimate * tolerance_;
     };
     if (may() && gauge_spans_ == kGaugeLadder[0][1] && spans > kGaugeLadder[1][1])
       estimate_gauge(kGaugeLadder[1], even);
