@@ -3,11 +3,14 @@
 
 #include <Eigen/Eigenvalues>
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdio>
 #include <limits>
 #include <map>
+#include <optional>
 #include <queue>
+#include <set>
 
 #include "body/mass_properties.h"
 #include "body/support.h"
@@ -26,22 +29,25 @@ namespace {
 // functions.
 constexpr int kLadder[][2] = {{3, 1}, {4, 1}, {3, 2}, {4, 2}, {3, 3}, {4, 3}, {3, 4}};
 constexpr int kGaugeLadder[][2] = {{4, 4}, {4, 6}, {4, 8}, {4, 10}, {4, 12}};
-constexpr int kCostlySpans = 4;  // polynomial fits take 10 s from here on ...
-constexpr double kNear = 1.5;    // ... and need a last error of less than this times the tolerance
-constexpr double kFine = 4;      // times the tolerance is the first error where many points are expected
+constexpr int kCostlySpans = 4;       // polynomial fits take 10 s from here on ...
+constexpr double kNear = 1.5;         // ... and need a last error of less than this times the tolerance
+constexpr double kCrystalNear = 1.3;  // ... and for a higher degree of crystals
+constexpr double kFine = 4;           // times the tolerance is the first error where many points are expected
 constexpr double kPolynomialGain =
     1.6;                         // error of the first gauge function over polynomial ones', at the most
 constexpr int kMostDents = 2;    // polynomial bodies near enough but dented: no more are tried then
 constexpr double kSteepest = 3;  // power of the spans by which an error falls, at the most, and with edges:
-constexpr double kGaugeSteepest = 2;   // .. of hulls for which polynomial patches were too few
-constexpr double kRaised = 2;          // largest gain of a degree: rungs that need more of it are skipped
+constexpr double kGaugeSteepest = 2;  // .. of hulls for which polynomial patches were too few
+constexpr double kRaised = 2;         // largest gain of a degree: rungs that need more of it are skipped
+constexpr double kPolynomialRate = 0.4, kRaisedLater = 1.2;  // of an error's fall as the last ones tell it
 constexpr double kCurvatureShare = 3;  // least curvature over the tolerance, both relative
 constexpr double kLeastCurvature = 0.002, kMostCurvature = 0.1;
 constexpr double kGaugeCurvatures[] = {10, 3, 1};  // over the tolerance: the first that can be had
 // Least height of a cap of curvature 1 over a triangle of area 1: the squared radius of its circle, halved.
 const double kTriangleBulge = 2 / (3 * std::sqrt(3.0));
-constexpr double kGaugeGain = 1.4;  // largest fall of the error by asking for less curvature
-constexpr int kFurther = 2;         // rungs tried beyond a body that is near enough, but not proven convex
+constexpr double kGaugeHope = 1.03;  // times the tolerance, of an error to be expected: not worth a try
+constexpr double kGaugeGain = 1.4;   // largest fall of the error by asking for less curvature
+constexpr int kFurther = 2;          // rungs tried beyond a body that is near enough, but not proven convex
 constexpr double kSurelyTooCoarse = 3;  // times the tolerance: no freer fit is tried
 // A fit that aims at far less than it can reach weighs distances so heavily that it loses convexity: the aim
 // falls from kFirstAim (of the radius) with what has been reached.
@@ -51,9 +57,22 @@ constexpr double kAim = 0.97, kOutwardAim = 0.93;  // of a tolerance, left to sa
 // crowd.
 constexpr double kFirstSlide = 0.05, kFreeSlide = 0.15;
 constexpr double kPlaneShare = 0.02;  // of the tolerance: faces that are plane to this may be one
-constexpr size_t kMostFaces = 60;     // of a polyhedron with rounded edges ...
-constexpr size_t kMostFacesAtLast =
-    300;  // ... where nothing else is within the tolerance: seconds to load, and contacts are slow
+// Faces of a polyhedron with rounded edges, which bodies of a few keep whatever else would do. Of more, its
+// contacts take 3 to 5 times as long at rest as a spline's, and 3 to 10 times as they begin: splines of fewer
+// points are tried first.
+constexpr size_t kFlatFaces = 12, kMostFaces = 60;
+constexpr size_t kMostFacesAtLast = 300;  // where nothing else is within the tolerance: seconds to load
+// Its control points for every face but two: three faces meet at most corners of an eroded polyhedron, three
+// patches of 25 points at each, two of 6 along an edge.
+constexpr size_t kPointsPerFace = 194;
+constexpr double kSharper = 0.5;  // of the tolerance: where estimates of what gauge functions can do end
+// Spans from which a gauge function takes 5 s, and what times the tolerance the last error must be where a
+// crystal's polyhedron does.
+constexpr int kCostlyGauge = 10;
+constexpr double kCostlyNear = 1.1;
+constexpr double kEstimate = 1.1;  // times the tolerance, as estimates are 5 % off
+// Growth of the power of the spans by which an error falls, from two rungs to the next.
+constexpr double kRateGain = 1;
 constexpr int kBisections = 14;      // of a rounding that the hull has already ...
 constexpr double kSurelyNear = 0.1;  // ... unless it is as near as this share of the tolerance
 constexpr int kRoundings = 2;        // ... whose radius is found by the distance of the first one
@@ -334,6 +353,23 @@ std::string percent(double x) {
   return text;
 }
 
+// How an error falls as a power of the number of spans, from the last two it was found for.
+class ErrorFall {
+ public:
+  void add(int spans, double error) {
+    if (spans_ > 0 && spans > spans_) power_ = std::log(error_ / error) / std::log(spans / double(spans_));
+    spans_ = spans;
+    error_ = error;
+  }
+  double at(int spans) const {
+    return spans > spans_ && power_ < 1e9 ? error_ * std::pow(spans_ / double(spans), power_) : 0;
+  }
+
+ private:
+  int spans_ = 0;
+  double error_ = 0, power_ = 1e10;
+};
+
 class HullFitter {
  public:
   HullFitter(const ConvexHull& hull, const HullFitOptions& options, double thin, double volume_error)
@@ -354,11 +390,10 @@ class HullFitter {
     int further = 0;
     for (const auto& [degree, spans] : kLadder) {
       if ((!any && spans != options_.spans) || too_many(degree, spans)) continue;
-      if (spans > 1 && any && (try_revolution() || try_polyhedron(kMostFaces) || try_round_edges()))
-        return best_;
+      if (spans > 1 && any && (try_revolution() || try_faces(points_of(degree, spans)))) return best_;
       if (any && too_coarse(degree, spans)) continue;
       if (any && spans > 1 && dents_ == kMostDents) break;
-      if (any && spans > 1 && start_error_ > kFine * tolerance_ && !polynomials_may_do(even_hull)) break;
+      if (any && spans > 1 && !polynomials_may_do(even_hull)) break;
       if (try_rung(degree, spans, target)) return best_;
       if (best_.shape && further++ == kFurther) return best_;
     }
@@ -366,11 +401,13 @@ class HullFitter {
       if (!any && try_gauge(degree, options_.spans, even_hull)) return best_;
     for (const auto& [degree, spans] : kGaugeLadder) {
       if (!any || too_many(degree, spans)) break;
-      const double falls = std::pow(gauge_spans_ / double(spans), kGaugeSteepest);
-      if (gauge_spans_ > 0 && gauge_error_ * falls > tolerance_) continue;
+      if (try_faces(points_of(degree, spans))) return best_;
+      if (!gauge_may_do(spans, even_hull)) continue;
       if (try_gauge(degree, spans, even_hull)) return best_;
       if (best_.shape && further++ == kFurther) break;
     }
+    if (any && !best_.shape && options_.most_points == 0 && try_faces(kMostFaces * kPointsPerFace))
+      return best_;
     if (best_.shape) return best_;  // its convexity is measured, not proven
     if (any && options_.most_points == 0 && try_polyhedron(kMostFacesAtLast)) return best_;
     if (best_.shape) return best_;
@@ -403,18 +440,48 @@ class HullFitter {
     return false;
   }
 
-  bool too_many(int degree, int spans) const {
+  static size_t points_of(int degree, int spans) {
     const size_t size = SmoothCube::net_size(degree, spans);
-    return options_.most_points > 0 && kCubeFaces * size * size > options_.most_points;
+    return kCubeFaces * size * size;
   }
+
+  bool too_many(int degree, int spans) const {
+    return options_.most_points > 0 && points_of(degree, spans) > options_.most_points;
+  }
+
+  // Faces of a hull that is a polyhedron of up to kMostFaces, 0 where it is not.
+  size_t crystal_faces() {
+    if (!crystal_faces_) crystal_faces_ = facets(hull_, kMostFaces, face_roundoff()).size();
+    return *crystal_faces_;
+  }
+  double face_roundoff() const { return std::max(kSingleRoundoff, kPlaneShare * options_.tolerance); }
 
   // Whether the error so far can't fall to the tolerance by going to this rung, or the rung costs too much
   // for what it may bring.
-  bool too_coarse(int degree, int spans) const {
+  bool too_coarse(int degree, int spans) {
+    if (spans > 1 && dear_crystal(degree, spans)) return true;
     if (!(start_error_ < kFar)) return spans >= kCostlySpans;
     const double gain =
         std::pow(spans / double(start_spans_), kSteepest) * (degree > start_degree_ ? kRaised : 1);
-    return start_error_ > gain * tolerance_ || (spans >= kCostlySpans && start_error_ > kNear * tolerance_);
+    if (start_error_ > gain * tolerance_ || (spans >= kCostlySpans && start_error_ > kNear * tolerance_))
+      return true;
+    // With edges, errors fall slowly: as they did, and a little faster.
+    int last = spans;
+    while (last > 1 && !(polynomial_error_[last - 1] < kFar)) --last;
+    if (spans < 3 || last < 2 || !(polynomial_error_[last - 2] < kFar)) return false;
+    const double now = polynomial_error_[last - 1], before = polynomial_error_[last - 2];
+    const double rate =
+        kPolynomialRate + std::max(0.0, std::log(before / now) / std::log(last / (last - 1.0)));
+    const double raised = degree > start_degree_ ? kRaisedLater : 1;
+    return now * std::pow(last / double(spans), rate) > raised * tolerance_;
+  }
+
+  // Whether this rung is left out for a crystal, whose edges polynomials round but slowly: where its lower
+  // degree was far off, and where gauge functions do, within a second, with at most half as many points more.
+  bool dear_crystal(int degree, int spans) {
+    if (crystal_faces() == 0 || gauge_error_ > tolerance_) return false;
+    if (degree > 3 && polynomial_error_[spans - 1] > kCrystalNear * tolerance_) return true;
+    return 3 * points_of(degree, spans) > 2 * points_of(kGaugeLadder[0][0], kGaugeLadder[0][1]);
   }
 
   // A body of revolution of few corners, as cylinders and cones are: flat faces and straight sides stay so,
@@ -453,16 +520,21 @@ class HullFitter {
     return false;
   }
 
+  // Polyhedra of a few faces, or of no more control points than these.
+  bool try_faces(size_t points) {
+    size_t faces = std::clamp(points / kPointsPerFace + 2, kFlatFaces, kMostFaces);
+    if (options_.most_points > 0) faces = std::min(faces, options_.most_points / kPointsPerFace + 2);
+    return try_polyhedron(faces) || try_round_edges(faces);
+  }
+
   // The hull of a few faces with its edges rounded, as far as its corners allow: creases are dear to splines.
   // Rounded coordinates far from the origin leave faces less plane than single precision does near it.
   bool try_polyhedron(size_t most_faces) {
-    if (faces_tried_ >= most_faces) return false;
-    faces_tried_ = most_faces;
-    size_t tried = 0;
-    for (double roundoff : {std::max(kSingleRoundoff, kPlaneShare * options_.tolerance), kSingleRoundoff}) {
+    if (most_faces_tried_ >= most_faces) return false;
+    most_faces_tried_ = most_faces;
+    for (double roundoff : {face_roundoff(), kSingleRoundoff}) {
       const std::vector<HalfSpace> faces = facets(hull_, most_faces, roundoff);
-      if (faces.empty() || faces.size() == tried) continue;
-      tried = faces.size();
+      if (faces.empty() || !faces_tried_.insert(faces.size()).second) continue;
       if (try_rounded(faces)) return true;
     }
     return false;
@@ -470,10 +542,10 @@ class HullFitter {
 
   // A polyhedron whose edges are round already, by more than the tolerance allows: of a rounding too small
   // the body stands out of the hull, of one too large it stays behind. Bisection to where both are equal.
-  bool try_round_edges() {
-    if (round_edges_tried_) return false;
-    round_edges_tried_ = true;
-    for (const std::vector<HalfSpace>& faces : large_faces(hull_)) {
+  bool try_round_edges(size_t most_faces) {
+    if (!large_faces_) large_faces_ = large_faces(hull_);
+    for (const std::vector<HalfSpace>& faces : *large_faces_) {
+      if (faces.size() > most_faces || !round_edges_tried_.insert(faces.size()).second) continue;
       double low = 0, high = kFar, least = kFar;
       for (const HalfSpace& f : faces) high = std::min(high, f.offset - f.normal.dot(mass_.center));
       std::vector<NurbsSurface> best;
@@ -556,33 +628,65 @@ class HullFitter {
     const double reached = fit.error / radius_;
     const std::string kind = rung_name("", degree, spans, cube.count());
     if (fit.error > 1.5 * tolerance_) {
+      polynomial_error_[spans - 1] = std::min(polynomial_error_[spans - 1], fit.error);
       say(kind + (fit.error < kFar ? ": off by about " + percent(reached) : ": not convex"));
       if (fit.error < kFar) least_ = std::min(least_, reached);
       return false;
     }
+    double certified = 0;
     bool accepted = false;
     const auto accept = [&](const ConvexFit& found) {
       std::vector<NurbsSurface> body = cube.surfaces(found.points);
       transform(body, frame_.from, frame_.center);
       const bool good = judge(std::move(body), kind);
+      if (certified == 0) certified = judged_.worst();
       accepted = accepted || good;
       return good;
     };
-    if (accept(fit) || fit.error <= tolerance_) raise_curvature(cube, fit, offset, free, accept);
+    const bool good = accept(fit);
+    double& error = polynomial_error_[spans - 1];
+    error = std::min(error, std::max(fit.error, certified));
+    if (good || fit.error <= tolerance_) raise_curvature(cube, fit, offset, free, accept);
     return accepted;
   }
 
   // What the first rung of gauge functions can reach tells soon what polynomial patches of about as many
   // points can.
   bool polynomials_may_do(const ConvexHull& even) {
-    if (gauge_spans_ == 0) {
-      GaugeFitOptions options = gauge_options();
-      const auto& [degree, spans] = kGaugeLadder[0];
-      options.least_curvature = kLeastCurvature;
-      gauge_error_ = fit_gauge(degree, spans, even, options).error * kAim * tolerance_;
-      gauge_spans_ = spans;
-    }
+    if (gauge_spans_ == 0) estimate_gauge(kGaugeLadder[0], even);
     return gauge_error_ < kPolynomialGain * tolerance_;
+  }
+
+  // What gauge functions of so many spans can reach at all.
+  void estimate_gauge(const int (&rung)[2], const ConvexHull& even) {
+    GaugeFitOptions options = gauge_options();
+    options.least_curvature = kLeastCurvature;
+    options.inward *= kSharper;  // so that it goes on beyond the tolerance
+    options.outward *= kSharper;
+    const double before = gauge_error_;
+    gauge_error_ = fit_gauge(rung[0], rung[1], even, options).error * kSharper * kAim * tolerance_;
+    if (gauge_spans_ > 0 && rung[1] > gauge_spans_)
+      gauge_power_ = kRateGain + std::log(before / gauge_error_) / std::log(rung[1] / double(gauge_spans_));
+    gauge_spans_ = rung[1];
+    if (gauge_error_ <= tolerance_) return;
+    const int count = SmoothCube(rung[0], rung[1]).count();
+    most_points_ = std::max(most_points_, count);
+    least_ = std::min(least_, gauge_error_ / radius_);
+    say(rung_name("rational ", rung[0], rung[1], count) + ": off by about " +
+        percent(gauge_error_ / radius_) + " at the least");
+  }
+
+  // Whether the error of the last rung can fall to the tolerance with so many spans; the second one tells how
+  // fast it does, which is slowly where edges are sharp.
+  bool gauge_may_do(int spans, const ConvexHull& even) {
+    if (crystal_faces() > 0 && spans >= kCostlyGauge && gauge_error_ > kCostlyNear * tolerance_) return false;
+    const auto may = [&] {
+      const double falls = std::pow(gauge_spans_ / double(spans), gauge_power_);
+      return gauge_spans_ == 0 || gauge_error_ * falls <= kEstimate * tolerance_;
+    };
+    if (may() && gauge_spans_ == kGaugeLadder[0][1] && spans > kGaugeLadder[1][1])
+      estimate_gauge(kGaugeLadder[1], even);
+    return may();
   }
 
   // More points, but sure to converge.
@@ -591,15 +695,19 @@ class HullFitter {
     most_points_ = std::max(most_points_, count);
     const std::string kind = rung_name("rational ", degree, spans, count);
     GaugeFitOptions options = gauge_options();
-    for (double share : kGaugeCurvatures) {
+    for (size_t which = 0; which < std::size(kGaugeCurvatures); ++which) {
+      const double share = kGaugeCurvatures[which];
+      ErrorFall& fall = gauge_fall_[which];
+      if (fall.at(spans) > kGaugeHope * tolerance_) continue;  // as curvature lets it fall
       options.least_curvature = std::clamp(share * tolerance_ / radius_, kLeastCurvature, kMostCurvature);
       // A face bulges by no more than from its corners, as low as they may be, to as high as it may be.
       const double bulge = kTriangleBulge * options.least_curvature * face_area_;
-      if (share > kGaugeCurvatures[2] && bulge > 2 * tolerance_ / radius_) continue;
+      if (which + 1 < std::size(kGaugeCurvatures) && bulge > 2 * tolerance_ / radius_) continue;
       for (int pass = 0; pass < 2; ++pass) {  // what certifies further away is asked to be nearer
         GaugeFit fit = fit_gauge(degree, spans, even, options);
         gauge_error_ = fit.error * kAim * tolerance_;
         gauge_spans_ = spans;
+        if (pass == 0) fall.add(spans, gauge_error_);
         if (fit.error > 1 / kAim) break;  // the certificate decides
         transform(fit.surfaces, frame_.from, frame_.center);
         if (judge(std::move(fit.surfaces), kind)) return true;
@@ -688,12 +796,18 @@ class HullFitter {
   int most_points_ = 0;
   double radius_ = 0, tolerance_ = 0, least_ = kFar, start_error_ = kFar;
   std::vector<NurbsSurface> start_;
+  std::array<double, 4> polynomial_error_ = {kFar, kFar, kFar, kFar};  // by spans - 1
   int dents_ = 0, start_degree_ = 0, start_spans_ = 0, gauge_spans_ = 0;
-  double gauge_error_ = kFar;
-  double face_area_ = 0;    // of the hull's largest triangle, where it is about as wide in all directions
-  HullDistance judged_;     // of the last body that loaded without a dent
-  size_t faces_tried_ = 0;  // of polyhedra, at the most
-  bool round_edges_tried_ = false, revolution_tried_ = false;
+  double gauge_error_ = kFar, gauge_power_ = kGaugeSteepest;
+  double face_area_ = 0;  // of the hull's largest triangle, where it is about as wide in all directions
+  HullDistance judged_;   // of the last body that loaded without a dent
+  ErrorFall gauge_fall_[std::size(kGaugeCurvatures)];
+  std::optional<size_t> crystal_faces_;
+  size_t most_faces_tried_ = 0;   // of polyhedra
+  std::set<size_t> faces_tried_;  // of each of them
+  std::optional<std::vector<std::vector<HalfSpace>>> large_faces_;
+  std::set<size_t> round_edges_tried_;  // numbers of faces
+  bool revolution_tried_ = false;
   HullFit best_;
 };
 

@@ -38,13 +38,14 @@ struct HullFit {
   std::string kind;   // "sphere" or "bicubic, 2 x 2 spans", ...
 };
 
-// The first of: an exact sphere; bodies of revolution and polyhedra with their edges rounded, where the hull
-// is nearly one of few corners; bicubic and biquartic bodies of smooth joints on six patches of growing
-// numbers of spans, polynomial ones first (convex_fit.h), then rational ones (gauge_fit.h), whose certified
-// distance is within the tolerance, which load without a dent and are proven convex; of that many spans then
-// the one of the largest least curvature found. Where none is proven convex, the first that is within the
-// tolerance. Throws ShapeError when there is none, naming the best that was reached. Seconds; 10 to 50 where
-// a rough hull wants thousands of points.
+// The first, by growing numbers of control points, of: an exact sphere; bodies of revolution and polyhedra
+// with their edges rounded, where the hull is nearly one of few corners (those of up to twelve faces before
+// patches of more than a span, so that flat faces stay); bicubic and biquartic bodies of smooth joints on six
+// patches of growing numbers of spans, polynomial ones (convex_fit.h), then rational ones (gauge_fit.h), as
+// far as the errors of those before leave hope; whose certified distance is within the tolerance, which load
+// without a dent and are proven convex; of that many spans then the one of the largest least curvature found.
+// Where none is proven convex, the first that is within the tolerance. Throws ShapeError when there is none,
+// naming the best that was reached. Seconds; 10 to 20 where a rough hull wants thousands of points.
 HullFit fit_hull(const ConvexHull& hull, const HullFitOptions& options);
 
 }  // namespace nurbs

@@ -311,6 +311,20 @@ class Fit(unittest.TestCase):
                     self.assertAlmostEqual(float(re.search(r"; curvature radius (\S+) to", said.stdout)[1]) / rounding, 1, 1)
                     self.assert_near(sample(box, 12)[0], 0.003)
 
+    def test_crystals_get_splines_of_fewer_points(self):
+        """More than twelve faces are no reason for thousands of points: a smooth body of less than 1,000 is as near."""
+        for seed in (1, 2):
+            with self.subTest(seed=seed):
+                points, faces = meshes.icosphere(0)
+                points = points * np.random.default_rng(seed).uniform(0.9, 1.1, size=(len(points), 1)) * (1.2, 1, 0.9)
+                said = self.fit(points, faces, "--tolerance", "5%")
+                self.assertLessEqual(int(re.search(r"(\d+) control points in the file", said)[1]), 726)
+                self.assertIn("strictly convex", call("info", self.out).stdout)
+                self.assertIn("proven: no dents", call("check", self.out).stdout)
+                self.assert_near(points, 0.05)
+                bounds = re.search(r"distance from the hull: (\S+) % outward, (\S+) % inward", said).groups()
+                self.assertLess(max(map(float, bounds)), 5)
+
     def test_many_faces_at_last(self):
         """Half a cylinder is neither of revolution nor of a few faces: a polyhedron, as nothing else is near enough."""
         points, faces = meshes.prism(128)
