@@ -522,8 +522,7 @@ class HullFitter {
 
   // Polyhedra of a few faces, or of no more control points than these.
   bool try_faces(size_t points) {
-    size_t faces = std::clamp(points / kPointsPerFace + 2, kFlatFaces, kMostFaces);
-    if (options_.most_points > 0) faces = std::min(faces, options_.most_points / kPointsPerFace + 2);
+    const size_t faces = std::clamp(points / kPointsPerFace + 2, kFlatFaces, kMostFaces);
     return try_polyhedron(faces) || try_round_edges(faces);
   }
 
