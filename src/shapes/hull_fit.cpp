@@ -32,7 +32,6 @@ constexpr int kGaugeLadder[][2] = {{4, 4}, {4, 6}, {4, 8}, {4, 10}, {4, 12}};
 constexpr int kCostlySpans = 4;       // polynomial fits take 10 s from here on ...
 constexpr double kNear = 1.5;         // ... and need a last error of less than this times the tolerance
 constexpr double kCrystalNear = 1.3;  // ... and for a higher degree of crystals
-constexpr double kFine = 4;           // times the tolerance is the first error where many points are expected
 constexpr double kPolynomialGain =
     1.6;                         // error of the first gauge function over polynomial ones', at the most
 constexpr int kMostDents = 2;    // polynomial bodies near enough but dented: no more are tried then
@@ -522,8 +521,7 @@ class HullFitter {
 
   // Polyhedra of a few faces, or of no more control points than these.
   bool try_faces(size_t points) {
-    size_t faces = std::clamp(points / kPointsPerFace + 2, kFlatFaces, kMostFaces);
-    if (options_.most_points > 0) faces = std::min(faces, options_.most_points / kPointsPerFace + 2);
+    const size_t faces = std::clamp(points / kPointsPerFace + 2, kFlatFaces, kMostFaces);
     return try_polyhedron(faces) || try_round_edges(faces);
   }
 
