@@ -111,9 +111,10 @@ std::vector<bool> sides_to_turn(const Draft& draft) {
   }
   for (int i = 0; i < count; ++i) {
     if (parts[i] == 0) continue;
-    throw ShapeError("patch " + std::to_string(i) +
-                     " is not connected to patch 0: the surfaces bound more than one body, or are joined by faces of " +
-                     number(kJoinTolerance) + " of its size");
+    throw ShapeError(
+        "patch " + std::to_string(i) +
+        " is not connected to patch 0: the surfaces bound more than one body, or are joined by faces of " +
+        number(kJoinTolerance) + " of its size");
   }
   return turned;
 }

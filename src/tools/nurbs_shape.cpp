@@ -289,7 +289,8 @@ std::uint64_t whole(const Options& options, const std::string& name, double othe
 }
 
 constexpr double kMostSeed = 9e15;
-constexpr double kLeastPebble = 1e-29, kMostPebble = 1e29;  // radius: a shape file's extents are 1e-30 to 1e30
+constexpr double kLeastPebble = 1e-29,
+                 kMostPebble = 1e29;  // radius: a shape file's extents are 1e-30 to 1e30
 
 Body make_pebble(const Options& options) {
   const double radius = options.positive("--radius", 1);
