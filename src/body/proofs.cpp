@@ -98,6 +98,14 @@ bool winds_once_everywhere(const Shape& shape) {
   return true;
 }
 
+// How fast the tensor of curvature radii changes with the direction of the normal.
+std::string rate_line(const Proofs& p) {
+  if (p.unrated_share == 0)
+    return format("proven: they change by at most %.3g a radian (%.3g occurs)", p.rate, p.seen_rate);
+  return format("proven: but for %.2g %% of the surface they change by at most %.3g a radian (%.3g occurs)",
+                100 * p.unrated_share, p.rate, p.seen_rate);
+}
+
 }  // namespace
 
 bool proven_without_dents(const Shape& shape) {
@@ -126,17 +134,15 @@ std::vector<std::string> describe_proofs(const Shape& shape) {
     lines.push_back(format("not proven: curvature of %.3g %% of the surface (dents, inflections, tips)",
                            100 * p.unproven_share));
   }
-  lines.push_back(format("proven: curvature radii from %.4g to %.4g (%.4g to %.4g occur), %d cells",
-                         radii.min_radius, radii.max_radius, p.sphere ? radii.min_radius : p.seen_min,
-                         p.sphere ? radii.max_radius : p.seen_max, p.cells));
-  if (p.rate > 0 && !p.sphere)
+  if (!(p.seen_max > 0) && !p.sphere) {
     lines.push_back(
-        p.seen_rate <= p.rate
-            ? format("proven: they change by at most %.3g a radian (%.3g occurs)", p.rate, p.seen_rate)
-            : format(
-                  "proven: but for places that have no bound they change by at most %.3g a radian (there, by "
-                  "%.3g)",
-                  p.rate, p.seen_rate));
+        format("proven: curvature radii from %.4g: all faces are flat, %d cells", radii.min_radius, p.cells));
+  } else {
+    lines.push_back(format("proven: curvature radii from %.4g to %.4g (%.4g to %.4g occur), %d cells",
+                           radii.min_radius, radii.max_radius, p.sphere ? radii.min_radius : p.seen_min,
+                           p.sphere ? radii.max_radius : p.seen_max, p.cells));
+    lines.push_back(rate_line(p));
+  }
   lines.push_back(format("proven: joints gape by at most %.2g, open by %.3g and close by %.3g degrees",
                          p.joint_gap, p.opening * 180 / M_PI, p.closing * 180 / M_PI));
   const bool none = proven_without_dents(shape);

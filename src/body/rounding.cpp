@@ -11,8 +11,7 @@ namespace nurbs {
 namespace {
 
 constexpr double kRounded = 1e-13;     // of a patch's size and of the squared radius: off its quadric
-constexpr double kBentBy = 1e3;        // curvatures err by so many times as much, relatively ...
-constexpr double kBentAnyhow = 1e-11;  // ... and by this
+constexpr double kBentAnyhow = 1e-11;  // relative error of a curvature that is always allowed for
 constexpr double kTwoNormals = 1e-3;   // rad: closer ones give no radius
 
 struct Sample {
@@ -46,6 +45,11 @@ double off_unit(BezierPatch patch, const Vec3& centre, const Mat3& map) {
 
 }  // namespace
 
+double bent_by(const BezierPatch& patch) {
+  const int n = 2 * std::max(patch.degree_u, patch.degree_v);
+  return 16.0 * n * (n - 1);
+}
+
 double rounding(const BezierPatch& patch) {
   const std::vector<Sample> samples = samples_of(patch);
   const Sample* one = &samples[0];
@@ -65,9 +69,10 @@ double rounding(const BezierPatch& patch) {
              cylinder = (Mat3::Identity() - axis * axis.transpose()) / radius;
   // Of a small part of a ball, or a narrow strip of a cylinder, an error of position bends more.
   const double in_u = (samples[7].n - samples[1].n).norm(), in_v = (samples[5].n - samples[3].n).norm();
+  const double bend = bent_by(patch);
   const auto bent = [&](const Mat3& map, double angle) {
     const double off = off_unit(patch, centre, map);
-    return off <= kRounded ? kBentBy * off / std::min(1.0, angle * angle) : kFarAway;
+    return off <= kRounded ? bend * off / std::min(1.0, angle * angle) : kFarAway;
   };
   const double error = std::min(bent(sphere, std::min(in_u, in_v)), bent(cylinder, std::max(in_u, in_v)));
   return std::max(radius * (1 - kBentAnyhow - error), 0.0);

@@ -10,6 +10,12 @@ namespace nurbs {
 // Of one patch: 0 if it is none of these, infinite if it is plane.
 double rounding(const BezierPatch& patch);
 
+// Curvature, times the square of the patch's width, over an error of position that is known all over it:
+// second derivatives of a Bernstein polynomial of degree n on the unit interval are at most 4 n (n - 1) times
+// its largest coefficient. Of the squared distance n is twice the patch's degree; four times that for weights
+// and uneven parameters.
+double bent_by(const BezierPatch& patch);
+
 // The least radius of the cylinders and spheres if every patch lies in one, or in a plane, to kRounded of its
 // size (proven from Bernstein coefficients), less what their round-off may bend them by; 0 where a patch does
 // not, infinite where all are plane. Enclosed curvatures (surface_bounds.h) are tight to kRadiusTightness

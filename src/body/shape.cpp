@@ -111,8 +111,10 @@ std::vector<bool> sides_to_turn(const Draft& draft) {
   }
   for (int i = 0; i < count; ++i) {
     if (parts[i] == 0) continue;
-    throw ShapeError("patch " + std::to_string(i) +
-                     " is not connected to patch 0: the surfaces bound more than one body");
+    throw ShapeError(
+        "patch " + std::to_string(i) +
+        " is not connected to patch 0: the surfaces bound more than one body, or are joined by faces of " +
+        number(kJoinTolerance) + " of its size");
   }
   return turned;
 }
@@ -214,6 +216,8 @@ Proofs summarise(const Shape& s, const SurfaceBounds& bounds, const KinkSummary&
       proofs.flat_share += share;
     else if (!leaf.bounds.convex)
       proofs.unproven_share += share;
+    if (!std::isfinite(leaf.bounds.rate) && !is_flat(leaf.bounds, s.bounding_radius))
+      proofs.unrated_share += share;
   }
   proofs.convex = proofs.unproven_share == 0;
   proofs.seen_min = bounds.seen_min;

@@ -82,6 +82,7 @@ struct Proofs {
   double unproven_share = 0;  // ... curvature neither proven positive nor flat: dents, inflections, tips
   double seen_min = 0, seen_max = 0;  // curvature radii that occur, beside patch_curvature's bounds
   double rate = 0, seen_rate = 0;     // largest finite LocalRate::rate, and one that occurs
+  double unrated_share = 0;           // of the patches' parameters: curved, without such a bound
   int cells = 0;                      // enclosed
   double joint_gap = 0;               // no two sides of a joint are further apart, length
   double opening = 0, closing = 0;    // no two normals at a joint make a larger angle, rad

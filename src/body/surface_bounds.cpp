@@ -25,7 +25,8 @@ constexpr int kConvexBudget = 6;
 constexpr int kDeepestOnBall = 10;
 constexpr double kPlaneTilt = 1e-6;     // rad: more of a tilt within a patch is no plane's round-off
 constexpr double kSurelyTurned = 1e-6;  // least over largest coefficient of a volume: far above round-off
-constexpr double kBent = 1e-3;          // over the bounding radius: a curvature worth it
+constexpr double kMostBent = 0.1;  // of a curvature: a patch on a ball in which it is known worse is a sliver
+constexpr double kBent = 1e-3;     // over the bounding radius: a curvature worth it
 
 struct Open {
   Leaf leaf;
@@ -170,17 +171,21 @@ auto multiplied(const Form<T>& f, const Form<S>& g, const Product& product) {
 struct Ball {
   Vec3 center = Vec3::Zero();
   double radius = 0;  // 0: none
+  double bent =
+      0;  // relative error of the curvatures, which positions up to round-off leave to a small patch
+  double tilt = 0;   // rad: the same of the normals
+  double width = 0;  // of the patch, length
 };
 
 bool may_be_round(const BezierPatch& patch) {
   return patch.rational && patch.degree_u >= 2 && patch.degree_v >= 2;
 }
 
-// Whether a patch bulges outward on a ball, up to round-off: |x - c|^2 - r^2 is a rational function, and
-// bounded by its net.
-bool lies_on(const Ball& ball, const BezierPatch& patch, double size) {
+// The ball, if a patch bulges outward on it, up to round-off, and is wide enough to have its curvature; else
+// none. |x - c|^2 - r^2 is a rational function, and bounded by its net.
+Ball lies_on(Ball ball, const BezierPatch& patch, double size) {
   const int p = patch.degree_u, q = patch.degree_v;
-  if (ball.radius == 0 || !may_be_round(patch)) return false;
+  if (ball.radius == 0 || !may_be_round(patch)) return {};
   Form<Vec4> net(p, q, Vec4::Zero());  // about the centre
   double lightest = kInfinity;
   for (int i = 0; i <= p; ++i)
@@ -192,10 +197,17 @@ bool lies_on(const Ball& ball, const BezierPatch& patch, double size) {
   const auto off = multiplied(net, net, [&](const Vec4& a, const Vec4& b) {
     return a.head<3>().dot(b.head<3>()) - ball.radius * ball.radius * a[3] * b[3];
   });
+  double most = 0;  // distance from the ball
   for (const double f : off.at)
-    if (!(std::abs(f) <= 2 * ball.radius * kNoDent * size * lightest * lightest)) return false;
-  const Jet2 j = evaluate2(patch, 0.5, 0.5);
-  return j.su.cross(j.sv).dot(j.s - ball.center) > 0;
+    most = std::max(most, std::abs(f) / (2 * ball.radius * lightest * lightest) + kRoundoff * ball.radius);
+  if (!(most <= kNoDent * size)) return {};
+  const Jet1 j = evaluate1(patch, 0.5, 0.5);
+  const Vec3 normal = j.su.cross(j.sv);
+  if (!(normal.dot(j.s - ball.center) > 0)) return {};
+  ball.width = std::min(normal.norm() / std::max(j.su.norm(), j.sv.norm()), ball.radius);
+  ball.bent = bent_by(patch) * most * ball.radius / (ball.width * ball.width);
+  ball.tilt = bent_by(patch) * most / ball.width;
+  return ball.bent < kMostBent ? ball : Ball{};
 }
 
 // The ball on which a patch lies, if any.
@@ -214,8 +226,10 @@ Ball ball_of(const BezierPatch& patch, double size) {
       squares[row++] = x.squaredNorm();
     }
   const Vec3 to_center = places.colPivHouseholderQr().solve(squares), center = middle + to_center;
-  const Ball ball{center, to_center.norm()};
-  return ball.radius < kLongRadius * size && lies_on(ball, patch, size) ? ball : Ball{};
+  Ball ball;
+  ball.center = center;
+  ball.radius = to_center.norm();
+  return ball.radius < kLongRadius * size ? lies_on(ball, patch, size) : Ball{};
 }
 
 // Whether the net of (x - c) . x_u x x_v shows that a patch on a ball has a normal all over a cell, whatever
@@ -262,15 +276,18 @@ void on_ball(const Ball& ball, const BezierPatch& patch, Leaf* leaf) {
       out.cone = std::max(out.cone, std::atan2(out.axis.cross(y).norm(), out.axis.dot(y)));
       farthest = std::max(farthest, y.norm());
     }
+    out.cone += ball.tilt;
     const double area = *least / (heaviest * heaviest * heaviest * ball.radius), w2 = lightest * lightest;
     out.speed_u = area * w2 / ((speed_v * heaviest + farthest * weight_v) * leaf->cell.du);
     out.speed_v = area * w2 / ((speed_u * heaviest + farthest * weight_u) * leaf->cell.dv);
     out.doubt = 0;
   }
   out.convex = true;
-  out.min_radius = out.max_radius = ball.radius;
-  out.least_curvature = 1 / ball.radius;
-  out.rate = 0;
+  out.min_radius = ball.radius * (1 - ball.bent);
+  out.max_radius = ball.radius / (1 - ball.bent);
+  out.least_curvature = 1 / out.max_radius;
+  // Another derivative, as the one from tilt to bend.
+  out.rate = ball.bent * ball.radius * bent_by(patch) * ball.radius / ball.width;
 }
 
 bool in_pole_strip(const Shape& shape, const Cell& c) {
@@ -376,7 +393,7 @@ class Bounder {
       const bool bulging = is_bulging_cylinder(shape_.patches[p], shape_.bounding_radius);
       const double known = rounding(shape_.patches[p]);
       // Planes, whose radius is infinite, are looked at all the same.
-      const double round = std::max(known < kFarAway ? known : 0, balls_[p].radius);
+      const double round = std::max(known < kFarAway ? known : 0, balls_[p].radius * (1 - balls_[p].bent));
       for (Cell& c : first_cells(shape_, out_.even, p)) {
         Leaf leaf{std::move(c), {}, {}};
         leaf.bounds = enclose(out_.even[p], leaf.cell, wanted(leaf.cell));
@@ -417,7 +434,7 @@ class Bounder {
       for (const EdgeLink& link : shape_.links[p]) {
         if (balls_[p].radius > 0 || smooth_pole(link, shape_.bounding_radius)) break;
         if (link.patch < 0) continue;
-        if (lies_on(own[link.patch], out_.even[p], shape_.bounding_radius)) balls_[p] = own[link.patch];
+        balls_[p] = lies_on(own[link.patch], out_.even[p], shape_.bounding_radius);
       }
   }
 

@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstdio>
+#include <string>
 
 #include "body/shape.h"
 
@@ -43,16 +45,27 @@ Profile mirrored(Profile lower) {
   return lower;
 }
 
+std::string number(double value) {
+  char text[32];
+  std::snprintf(text, sizeof text, "%.9g", value);
+  return text;
+}
+
 // Cap of radius `cap` whose edge is rounded by `rim` up to the cylinder of `radius`, below a band.
 Profile cap_and_rim(double radius, double band, double cap, double rim) {
-  if (!(rim > 0 && rim < radius && rim < cap))
-    throw ShapeError("the rim's radius must be less than the other radii");
-  if (!(cap >= radius)) throw ShapeError("the cap's radius must be the body's radius at least");
+  if (!(cap >= radius))
+    throw ShapeError("the cap's radius is " + number(cap) + ", must be the body's radius, " + number(radius) +
+                     ", at least");
+  if (!(rim > 0 && rim < radius))
+    throw ShapeError("the rim's radius is " + number(rim) + ", must be less than the body's radius, " +
+                     number(radius));
   // The rim's centre is on r = radius - rim, inside the cap's sphere by cap - rim.
-  const double reach = cap - rim, across = radius - rim, down = std::sqrt(reach * reach - across * across);
+  const double across = radius - rim, down = std::sqrt((cap - radius) * (cap + radius - 2 * rim));
   const Vec2 rim_center(across, -0.5 * band), cap_center(0, -0.5 * band + down);
   const double joint = std::atan2(-down, across);  // polar angle of the common normal
-  return {arc(cap_center, cap, -M_PI / 2, joint), arc(rim_center, rim, joint, 0)};
+  Profile out{arc(cap_center, cap, -M_PI / 2, joint)};
+  if (joint < 0) out.push_back(arc(rim_center, rim, joint, 0));  // none below a half sphere
+  return out;
 }
 
 // --- rounded box
@@ -184,7 +197,8 @@ std::vector<NurbsSurface> capsule(double radius, double length) {
 
 std::vector<NurbsSurface> tablet(double radius, double height, double rim) {
   if (!(rim > 0 && rim < radius && rim <= 0.5 * height))
-    throw ShapeError("the rim's radius must be less than the radius and at most half the height");
+    throw ShapeError("the rim's radius is " + number(rim) + ", must be less than the body's radius, " +
+                     number(radius) + ", and at most half the height, " + number(0.5 * height));
   const double low = -0.5 * height, inner = radius - rim;
   Profile lower{line({0, low}, {inner, low}), arc({inner, low + rim}, rim, -M_PI / 2, 0)};
   if (rim < 0.5 * height) lower.push_back(line({radius, low + rim}, {radius, -low - rim}));

@@ -7,10 +7,21 @@
 #include <charconv>
 #include <cstdio>
 #include <cstring>
+#include <filesystem>
 #include <fstream>
 #include <utility>
 
 namespace nurbs {
+
+namespace {
+
+// A pipe or a device, which is written into: a file in its place would take it away.
+bool is_special(const std::string& file) {
+  std::error_code error;
+  return std::filesystem::is_other(std::filesystem::status(file, error));
+}
+
+}  // namespace
 
 std::string format(const char* pattern, double value) {
   char text[64];
@@ -19,6 +30,13 @@ std::string format(const char* pattern, double value) {
 }
 
 void write_whole(const std::string& file, const std::string& text) {
+  if (is_special(file)) {
+    std::ofstream out(file, std::ios::binary);
+    out << text;
+    out.close();
+    if (!out) throw std::runtime_error("can't write " + file + ": " + std::strerror(errno));
+    return;
+  }
   const std::string draft = file + "." + std::to_string(getpid()) + ".tmp";
   std::ofstream out(draft, std::ios::binary);
   out << text;

@@ -40,7 +40,8 @@ Command add_view(CLI::App& app);
 
 std::string format(const char* pattern, double value);
 
-// Writes beside `file` and renames, so that `file` is whole or untouched.
+// Writes beside `file` and renames, so that `file` is whole or untouched; into it if it is a pipe or a
+// device.
 void write_whole(const std::string& file, const std::string& text);
 
 // The millimetres of "mm", "cm", "m", "um", "in" or a number; throws UsageError that names `command`.

@@ -289,6 +289,8 @@ std::uint64_t whole(const Options& options, const std::string& name, double othe
 }
 
 constexpr double kMostSeed = 9e15;
+constexpr double kLeastPebble = 1e-29,
+                 kMostPebble = 1e29;  // radius: a shape file's extents are 1e-30 to 1e30
 
 Body make_pebble(const Options& options) {
   const double radius = options.positive("--radius", 1);
@@ -308,8 +310,8 @@ Body make_pebble(const Options& options) {
 }
 
 // The surfaces turned outward, as the loader turns them.
-Body outward(Surfaces surfaces) {
-  return {make_shape("", std::move(surfaces))->surfaces, ""};
+Body outward(const Options& options, Surfaces surfaces) {
+  return {make_shape(options.output(), std::move(surfaces))->surfaces, ""};
 }
 
 Body make_capsule(const Options& options) {
@@ -318,12 +320,10 @@ Body make_capsule(const Options& options) {
 }
 
 Body make_tablet(const Options& options) {
-  const double radius = options.positive("--radius"), height = options.positive("--height"),
-               rim = options.positive("--rim");
-  if (!options.has("--cap")) return {tablet(radius, height, rim), ""};
-  return {biconvex_tablet(radius, options.number("--height", 0, 0, Options::kMost), options.positive("--cap"),
-                          rim),
-          ""};
+  const double radius = options.positive("--radius"), rim = options.positive("--rim");
+  if (!options.has("--cap")) return {tablet(radius, options.positive("--height"), rim), ""};
+  const double band = options.numbers("--height", 1, 0, Options::kMost)[0];
+  return {biconvex_tablet(radius, band, options.positive("--cap"), rim), ""};
 }
 
 Body make_lens(const Options& options) {
@@ -342,7 +342,7 @@ Body make_rounded_box(const Options& options) {
   if (rounding > axes.minCoeff())
     options.fail("--rounding is " + format("%g", rounding) + ", must be at most the least half edge, " +
                  format("%g", axes.minCoeff()));
-  return outward(rounded_box(axes, rounding));
+  return outward(options, rounded_box(axes, rounding));
 }
 
 constexpr int kMostFacets = 300;
@@ -360,7 +360,7 @@ Body make_rounded_polyhedron(const Options& options) {
     if (rounding >= faces[0].offset)
       options.fail("--rounding is " + format("%g", rounding) + ", must be below the inner radius, " +
                    format("%.6g", faces[0].offset));
-    return outward(rounded_polyhedron(faces, Vec3::Zero(), rounding));
+    return outward(options, rounded_polyhedron(faces, Vec3::Zero(), rounding));
   }
   if (options.has("--radius")) options.fail("--radius is for --solid: a mesh has its own size");
   const std::string file = options.text("--mesh");
@@ -373,7 +373,7 @@ Body make_rounded_polyhedron(const Options& options) {
       throw ShapeError("its hull has more than " + std::to_string(kMostFacets) + " faces: use fit");
     std::vector<NurbsSurface> surfaces = rounded_polyhedron(faces, hull.properties().center, rounding);
     put_in_place(file, *make_shape(file, surfaces), place, surfaces);
-    return outward(std::move(surfaces));
+    return outward(options, std::move(surfaces));
   } catch (const ShapeError& error) {
     const std::string what = error.what();
     throw ShapeError(what.rfind(file, 0) == 0 ? what : file + ": " + what);
@@ -548,7 +548,7 @@ void make_pebbles(const Options& options) {
   options.numbers("--count", 1, 1, 100000);
   const std::uint64_t count = whole(options, "--count", 1, 1, 100000),
                       seed = whole(options, "--seed", 1, 0, kMostSeed);
-  const double radius = options.positive("--radius", 1);
+  const double radius = options.number("--radius", 1, kLeastPebble, kMostPebble);
   const auto both = [](double lo, double hi) { return std::array{lo, hi}; };
   const auto roundness = options.has("--roundness") ? range(options, "--roundness", 0, 0) : both(0.3, 0.8);
   const auto elongation = options.has("--elongation") ? range(options, "--elongation", 0, 0.2) : both(0.6, 1);

@@ -2,6 +2,7 @@
 """nurbs-shape: every kind of body makes a file that passes the check; bad input gives one clear line and no file."""
 import json
 import math
+import os
 import pathlib
 import re
 import tempfile
@@ -24,6 +25,9 @@ EXACT = [(["capsule", "--radius", "1", "--length", "2"], 3, 2 * P + 4 / 3 * P, 2
          (["tablet", "--radius", "1", "--height", "0.8", "--rim", "0.2"], 5, None, None),
          (["tablet", "--radius", "1", "--height", "0.4", "--cap", "1.6", "--rim", "0.1"], 5, None, None),
          (["lens", "--radius", "1", "--cap", "1.5", "--rim", "0.1"], 4, None, 1),
+         (["tablet", "--radius", "1", "--height", "0", "--cap", "1.5", "--rim", "0.1"], 4, None, 1),
+         (["lens", "--radius", "1", "--cap", "1", "--rim", "0.1"], 2, 4 / 3 * P, 1),  # half spheres, no rim
+         (["tablet", "--radius", "1", "--height", "2", "--cap", "1", "--rim", "0.1"], 3, 2 * P + 4 / 3 * P, 2),
          (["egg", "--radius", "1", "--blunt", "1", "--pointed", "1.6"], 2, 2 / 3 * P * 2.6, None),
          (["rounded-box", "--axes", "1,0.8,0.6", "--rounding", "0.2"], 26,
           8 * 0.8 * 0.6 * 0.4 + 8 * 0.2 * (0.8 * 0.6 + 0.6 * 0.4 + 0.8 * 0.4) + P * 0.04 * 2 * 1.8 + 4 / 3 * P * 0.008,
@@ -53,13 +57,17 @@ BAD = [(["cone"], "cone"),
        (["fitted-ellipsoid", "--axes", "1,2,3", "--spans", "1.5"], "whole number"),
        (["rounded-box", "--axes", "1,2,3", "--rounding", "1.5"], "must be at most the least half edge, 1"),
        (["tablet", "--radius", "1", "--height", "1", "--rim", "0.6"], "at most half the height"),
-       (["lens", "--radius", "1", "--cap", "0.9", "--rim", "0.1"], "the cap's radius"),
+       (["tablet", "--radius", "1", "--height", "0", "--rim", "0.1"], "--height is 0, must be > 0"),
+       (["lens", "--radius", "1", "--cap", "0.9", "--rim", "0.1"], "the cap's radius is 0.9, must be the body's radius, 1, at least"),
+       (["lens", "--radius", "1", "--cap", "2", "--rim", "1.5"], "the rim's radius is 1.5, must be less than the body's radius, 1"),
+       (["rounded-box", "--axes", "1,1,1", "--rounding", "0.9999999"], "shape.json: patch 1 is not connected to patch 0"),
        (["capsule", "--radius", "1"], "--length is missing"),
        (["pebble", "--roundness", "0.5"], "add --seed"),
        (["pebble", "--seed", "1.5"], "whole number"),
        (["pebble", "--seed", "1", "--flatness", "0.1"], "must be in 0.2..1"),
        (["pebbles", "--count", "0"], "--count is 0"),
        (["pebbles", "--count", "2", "--roundness", "0.8,0.2"], "down to"),
+       (["pebbles", "--count", "2", "--radius", "1e30"], "--radius is 1e30, must be in 1e-29..1e+29"),
        (["superellipsoid", "--axes", "1,2,3"], "--exponent is missing"),
        (["superellipsoid", "--axes", "1,2,3", "--exponent", "1"], "must be in 2..12"),
        (["superellipsoid", "--axes", "1,2,3", "--exponent", "4", "--tolerance", "7%"], "at most 5%"),
@@ -169,6 +177,24 @@ class NurbsShape(unittest.TestCase):
         self.assert_one_error(call("make", "pebble", "-o", str(self.place / "none" / "a.json")), "can't write")
         self.assert_one_error(call("make", "pebble", "-o", str(self.place)), "can't write")
         self.assertEqual(list(self.place.iterdir()), [])
+
+    def test_pipes_and_devices_are_written_into(self):
+        pipe = self.place / "pipe"
+        os.mkfifo(pipe)
+        reader = os.open(pipe, os.O_RDWR | os.O_NONBLOCK)
+        self.addCleanup(os.close, reader)
+        made = call("make", "box", "--axes", "1,1,1", "-o", str(pipe))
+        self.assertEqual((made.returncode, made.stderr), (0, ""))
+        self.assertTrue(pipe.is_fifo())
+        self.assertEqual(len(json.loads(os.read(reader, 1 << 16))["shape"]["data"]), 6)
+
+    def test_check_says_how_fast_radii_change(self):
+        for kind, words in ((["sphere"], "change by at most 1e-12 a radian"),
+                            (["rounded-polyhedron", "--solid", "octahedron", "--rounding", "0.1"], "they change by at most 0 a radian"),
+                            (["egg", "--radius", "1", "--blunt", "1", "--pointed", "2"], "proven: but for 6.2 % of the surface they change by"),
+                            (["box", "--axes", "1,1,1"], "all faces are flat")):
+            self.assertEqual(call("make", *kind, "-o", str(self.file)).returncode, 0)
+            self.assertIn(words, call("check", str(self.file)).stdout)
 
     def test_unusable_files(self):
         self.assert_one_error(call("check", str(self.place / "none.json")), "none.json")
