@@ -45,7 +45,7 @@ struct HullFit {
 // far as the errors of those before leave hope; whose certified distance is within the tolerance, which load
 // without a dent and are proven convex; of that many spans then the one of the largest least curvature found.
 // Where none is proven convex, the first that is within the tolerance. Throws ShapeError when there is none,
-// naming the best that was reached. Seconds; 10 to 20 where a rough hull wants thousands of points.
+// naming the best that was reached. Seconds; 10 to 30 where a rough hull wants thousands of points.
 HullFit fit_hull(const ConvexHull& hull, const HullFitOptions& options);
 
 }  // namespace nurbs
