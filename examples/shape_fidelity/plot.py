@@ -38,18 +38,18 @@ def main(folder):
     figure, axes = plt.subplots(figsize=(7, 4.2))
     with open(folder / "shape_fidelity.csv", "w") as f:
         print("shape,runs,fraction,error,contacts,us_per_grain_step,error", file=f)
-        for shape, runs in found.items():
+        for number, (shape, runs) in enumerate(found.items()):
             (fraction, df), (contacts, _), (cost, dc) = (mean(x) for x in runs.T)
             print(f"{shape},{len(runs)},{fraction:.4f},{df:.4f},{contacts:.2f},{cost:.3f},{dc:.3f}", file=f)
             print(f"{shape:10} fraction {fraction:.4f} +- {df:.4f}, {contacts:.1f} contacts a grain, {cost:.2f} +- {dc:.2f} us "
                   f"a grain and step ({len(runs)} seeds)")
             axes.errorbar(cost, fraction, df, dc, "o", capsize=3)
             axes.annotate(shape.replace("fit-", "fit of ") + (" %" if "fit" in shape else ""), (cost, fraction),
-                          textcoords="offset points", xytext=(7, 5))
+                          textcoords="offset points", xytext=(0, (-16, 9)[number % 2]), ha="center")
     axes.set_xlabel("CPU time per grain and step (us), one core")
     axes.set_ylabel("packing fraction, with standard error")
-    axes.set_xlim(left=0)
     axes.margins(0.12)
+    axes.set_xlim(left=0)
     axes.grid(alpha=0.3)
     figure.tight_layout()
     figure.savefig(folder / "shape_fidelity.png", dpi=110)
