@@ -202,8 +202,10 @@ TEST(Connectivity, TwoBodiesAreRefused) {
   Surfaces body = box({1, 1, 1}), other = box({1, 1, 1});
   move(other, Mat3::Identity(), Vec3(5, 0, 0));
   body.insert(body.end(), other.begin(), other.end());
-  EXPECT_EQ(error_of(body),
-            "body: patch 6 is not connected to patch 0: the surfaces bound more than one body");
+  EXPECT_EQ(
+      error_of(body),
+      "body: patch 6 is not connected to patch 0: the surfaces bound more than one body, or are joined by "
+      "faces of 1e-06 of its size");
 }
 
 TEST(Connectivity, OneSidedSurfaceIsRefused) {
