@@ -2,6 +2,8 @@
 // (STL) or a picture (PNG).
 #include <unistd.h>
 
+#include <algorithm>
+#include <array>
 #include <cerrno>
 #include <cmath>
 #include <cstdint>
@@ -11,9 +13,13 @@
 #include <filesystem>
 #include <memory>
 #include <sstream>
+#include <string>
+#include <utility>
+#include <vector>
 
 #include "io/shape_file.h"
 #include "io/vtu_file.h"
+#include "nurbs/tolerances.h"
 #include "tools/cad_file.h"
 #include "tools/command.h"
 
@@ -67,14 +73,37 @@ void put(std::string& out, const Vec3& v) {
   }
 }
 
+// The patches' corners, (0, 0), (1, 0), (0, 1), (1, 1): of all that meet the first one's, so that none is
+// doubled.
+std::vector<std::array<Vec3, 4>> common_corners(const Shape& shape) {
+  const double apart = 2 * kJoinTolerance * shape.bounding_radius;
+  std::vector<Vec3> known;
+  std::vector<std::array<Vec3, 4>> corners;
+  for (const BezierPatch& patch : shape.patches) {
+    corners.emplace_back();
+    for (int k = 0; k < 4; ++k) {
+      const Vec3 x = evaluate0(patch, k % 2, k / 2);
+      const auto same =
+          std::find_if(known.begin(), known.end(), [&](const Vec3& y) { return (x - y).norm() <= apart; });
+      corners.back()[k] = same == known.end() ? x : *same;
+      if (same == known.end()) known.push_back(x);
+    }
+  }
+  return corners;
+}
+
 // Point (i, j) of a grid over a patch; on an edge that of the first of its two patches, whose parameters may
 // run otherwise, so that triangles meet.
-Vec3 grid_point(const Shape& shape, int patch, int i, int j, int cells) {
+Vec3 grid_point(const Shape& shape, const std::vector<std::array<Vec3, 4>>& corners, int patch, int i, int j,
+                int cells) {
   const auto inside = [cells](int k) { return k > 0 && k < cells; };
+  const auto corner = [&] { return corners[patch][(i > 0 ? 1 : 0) + (j > 0 ? 2 : 0)]; };
+  if (!inside(i) && !inside(j)) return corner();
   if (inside(i) != inside(j)) {
     const int edge = inside(j) ? (i > 0 ? 1 : 0) : (j > 0 ? 3 : 2), k = inside(j) ? j : i;
     const EdgeLink& link = shape.links[patch][edge];
-    if (!link.collapsed && link.patch >= 0 && std::pair(link.patch, link.edge) < std::pair(patch, edge)) {
+    if (link.collapsed) return corner();
+    if (link.patch >= 0 && std::pair(link.patch, link.edge) < std::pair(patch, edge)) {
       const int there = link.reversed ? cells - k : k, end = link.edge % 2 ? cells : 0;
       patch = link.patch;
       i = link.edge < 2 ? end : there;
@@ -89,18 +118,20 @@ Vec3 grid_point(const Shape& shape, int patch, int i, int j, int cells) {
 std::string stl(const Shape& shape, const Vec3& place, double error, size_t* count) {
   int cells = 2;
   for (const BezierPatch& patch : shape.patches) cells = std::max(cells, cells_for(patch, error));
+  const std::vector<std::array<Vec3, 4>> corners = common_corners(shape);
   std::string body;
   std::uint32_t triangles = 0;
   for (int patch = 0; patch < static_cast<int>(shape.patches.size()); ++patch) {
-    const auto at = [&](int i, int j) { return Vec3(grid_point(shape, patch, i, j, cells) + place); };
+    // As they are written: what is doubled then is none of a triangle's three.
+    const auto at = [&](int i, int j) -> Vec3 {
+      return (grid_point(shape, corners, patch, i, j, cells) + place).cast<float>().cast<double>();
+    };
     for (int i = 0; i < cells; ++i)
       for (int j = 0; j < cells; ++j) {
         const Vec3 p[4] = {at(i, j), at(i + 1, j), at(i + 1, j + 1), at(i, j + 1)};
         for (const auto& [b, c] : {std::pair{1, 2}, std::pair{2, 3}}) {
-          const Vec3 normal = (p[b] - p[0]).cross(p[c] - p[0]);
-          if (!(normal.norm() > 1e-14 * shape.bounding_radius * shape.bounding_radius))
-            continue;  // at a pole
-          put(body, normal.normalized());
+          if (p[0] == p[b] || p[0] == p[c] || p[b] == p[c]) continue;  // at a pole
+          put(body, (p[b] - p[0]).cross(p[c] - p[0]).stableNormalized());
           put(body, p[0]);
           put(body, p[b]);
           put(body, p[c]);

@@ -38,6 +38,23 @@ class View(unittest.TestCase):
         lower = np.linalg.norm(corners[corners[:, 2] < 0], axis=1)  # a half sphere about the origin
         self.assertLess(abs(lower - 1).max(), 1e-5)
 
+    def test_stl_closes_to_the_last_digit(self):
+        """Also at poles, at seams and where patches of several kinds have a corner in common."""
+        solid = self.place / "solid.json"
+        for kind in (["egg", "--radius", "1", "--blunt", "1", "--pointed", "2"], ["capsule", "--radius", "0.6", "--length", "1.2"],
+                     ["tablet", "--radius", "1", "--height", "0.6", "--rim", "0.1"], ["rounded-box", "--axes", "1,0.8,0.6", "--rounding", "0.2"],
+                     ["rounded-polyhedron", "--solid", "dodecahedron", "--rounding", "0.03"]):
+            self.assertEqual(call("make", *kind, "-o", solid).returncode, 0)
+            self.assertEqual(call("export", solid, "-o", self.place / "solid.stl").returncode, 0)
+            data = (self.place / "solid.stl").read_bytes()
+            rows = np.frombuffer(data[84:], dtype=[("numbers", "<f4", (12,)), ("attribute", "<u2")])["numbers"]
+            _, corner = np.unique(rows[:, 3:].reshape(-1, 3), axis=0, return_inverse=True)
+            a, b, c = corner.reshape(-1, 3).T
+            edges = np.concatenate([np.stack(e, axis=1) for e in ((a, b), (b, c), (c, a))])
+            there, back = (np.unique(e, axis=0) for e in (edges, edges[:, ::-1]))
+            self.assertEqual(len(there), len(edges), kind)
+            self.assertTrue(np.array_equal(there, back), kind)
+
     def test_stl_and_back_by_fit(self):
         stl, back = self.place / "egg.stl", self.place / "back.json"
         self.assertEqual(call("export", self.shape, "-o", stl).returncode, 0)
