@@ -127,11 +127,15 @@ bool is_bulging_cylinder(const BezierPatch& patch, double size) {
     ends[1][k] = b.head<3>() / b[3];
   }
   const Vec3 line = ends[1][1] - ends[0][1];
-  for (int k : {0, 2})
-    if (!((ends[1][k] - ends[0][k] - line).norm() <= kNoDent * size)) return false;
+  double off = 0;
+  for (int k : {0, 2}) off = std::max(off, (ends[1][k] - ends[0][k] - line).norm());
   const Vec3 *x = ends[0], chord = x[2] - x[0], normal = along_u ? line.cross(chord) : chord.cross(line);
   const double rise = normal.dot(x[1] - x[0]);
-  return rise > kNoDent * size * normal.norm();
+  if (!(off <= kNoDent * size && rise > kNoDent * size * normal.norm())) return false;
+  // Lines that are not quite parallel twist a small patch: its least curvature is then the square of x_uv
+  // over the sides' lengths, over the arc's curvature, below 0.
+  const double twist = 4 * off / line.norm(), arc = rise / normal.norm();
+  return twist * twist <= kCurvatureNoise / size * arc;
 }
 
 double binomial(int n, int k) {

@@ -617,5 +617,41 @@ TEST(SavedCase, joint_gaps_are_in_the_bracket) {
   EXPECT_GE(r.upper, gap - 1e-12);
 }
 
+// A short strip of a cylinder, twisted by what passes for round-off, is a saddle there.
+TEST(Dents, are_left_open_where_round_off_twists_a_small_cylinder) {
+  const auto flat_share = [](double twist) {
+    const double length = 1e-5, w = std::cos(1e-5);
+    BezierPatch strip;
+    strip.degree_u = 1;
+    strip.degree_v = 2;
+    for (int i = 0; i < 2; ++i)
+      for (int j = 0; j < 3; ++j) {
+        const double angle = 1e-5 * (j - 1), r = 0.5 / (j == 1 ? w : 1), weight = j == 1 ? w : 1;
+        const Vec3 x(r * std::sin(angle), -length * i,
+                     0.5 + r * std::cos(angle) + (i == 1 && j == 2 ? twist : 0));
+        strip.points.emplace_back(weight * x[0], weight * x[1], weight * x[2], weight);
+      }
+    Shape shape;
+    shape.bounding_radius = 1;
+    shape.patches = {strip};
+    shape.links.resize(1);
+    const SurfaceBounds bounds = bound_surface(shape, false);
+    double flat = 0;
+    for (const Leaf& leaf : bounds.leaves)
+      if (is_flat(leaf.bounds, 1)) flat += leaf.cell.du * leaf.cell.dv;
+    return flat;
+  };
+  EXPECT_EQ(flat_share(0), 1);
+  EXPECT_LT(flat_share(8e-14), 1);
+}
+
+// On a lens that is nearly a ball the rim is a strip that positions, to round-off, don't tell from the ball.
+TEST(Radii, of_a_narrow_rim) {
+  for (const double over : {1e-3, 1e-6, 1e-9, 1e-11, 1e-13}) {
+    const auto shape = make_shape("lens", lens(1, 1 + over, 0.1));
+    EXPECT_LE(shape->patch_curvature.min_radius, 0.11) << over;
+  }
+}
+
 }  // namespace
 }  // namespace nurbs
