@@ -276,6 +276,7 @@ void measure(Draft& draft) {
   s.ellipsoid = find_ellipsoid(s.patches, s.mass.inertia / s.mass.volume);
   s.revolution = find_revolution(s.patches, s.ellipsoid, s.bounding_radius);
   if (s.joint_slack == 0) s.meridian = make_meridian(s.patches, s.revolution, s.bounding_radius);
+  s.profile_radii = make_profile_radii(s.meridian, s.patches, s.bounding_radius);
   s.atlas = make_atlas(s, kAtlasCells);
 }
 

@@ -17,6 +17,7 @@
 #include "body/inner_map.h"
 #include "body/meridian.h"
 #include "body/normal_map.h"
+#include "body/profile_radii.h"
 #include "body/revolution.h"
 #include "body/rolling.h"
 #include "nurbs/bezier_patch.h"
@@ -127,10 +128,11 @@ struct Shape {
   NormalMap normal_map;                    // local bounds, for bodies with flats or dents
   DirectionAtlas atlas;
   LazyInnerMap lazy_inner_map;
-  Ellipsoid ellipsoid;    // that the body is, if it is one
-  Revolution revolution;  // about an axis, if the body is one
-  Meridian meridian;      // whose profile this is; empty for other bodies
-  FlatFeatures flats;     // faces, creases and ruled lines; empty for round bodies
+  Ellipsoid ellipsoid;         // that the body is, if it is one
+  Revolution revolution;       // about an axis, if the body is one
+  Meridian meridian;           // whose profile this is; empty for other bodies
+  ProfileRadii profile_radii;  // of that
+  FlatFeatures flats;          // faces, creases and ruled lines; empty for round bodies
 
   // Balls inside the body over directions.
   const InnerMap& inner_map() const { return lazy_inner_map.of(*this); }

@@ -14,7 +14,7 @@ constexpr int kFirstSpent = 900;        // ... and those after which it ends ...
 constexpr double kHopeless = 0.1;       // ... where less than this times its share of all is closed
 constexpr int kDeepestSector = 60;      // halvings of the azimuth
 constexpr double kNearAxis = 0.2;       // sine between the axes up to which both bodies' circles are used
-constexpr double kNearlyAlike = 0.1;    // of the body's radius: what directions of a ring may differ by
+constexpr double kNearlyAlike = 0.4;    // of the body's radius: what directions of a ring may differ by
 constexpr double kClosedShare = 0.9;    // of the tolerance at which a sector is closed ...
 constexpr double kMeridianShare = 0.4;  // ... and below which its width, not its circles, keeps it open
 constexpr double kLeastTilt = 3e-3;     // sine between the axes from which the mate's tip may do better
@@ -61,7 +61,7 @@ struct View {
     mate_axis = (turn_m * m->revolution.axis).normalized();
     if (mate_axis.dot(axis) < 0) mate_axis = -mate_axis;
     mate_point = scale_m * (turn_m * m->revolution.point);
-    mate_error = m->revolution.error;
+    mate_error = m->revolution.error + m->meridian.error;
     const double sine = axis.cross(mate_axis).norm();
     circles = m->revolution.found && sine < kNearAxis;
     if (circles) tilt = sine;
@@ -84,6 +84,7 @@ struct Circle {
   double rm;    // radius of that circle
   Angle at;     // angle from the axis it was asked for ...
   Vec3 e;       // ... and the direction
+  Vec3 nk, nm;  // the surfaces' own normals there, outward from K and into M
 };
 
 // (R, Z) of a circle at one azimuth.
@@ -181,7 +182,7 @@ class RingSearch {
     second_ = view_.axis.cross(tangent_);
     noise_ = 2 * kRoundoff *
                  (view_.scale_k * view_.k->bounding_radius + view_.scale_m * view_.m->bounding_radius) +
-             view_.scale_k * view_.k->revolution.error +
+             view_.scale_k * (view_.k->revolution.error + view_.k->meridian.error) +
              (view_.circles ? view_.scale_m * view_.mate_error : 0.0);
   }
 
@@ -255,6 +256,8 @@ class RingSearch {
     c.r = view_.across(x - view_.point).norm();
     c.at = {view_.axis.dot(e), view_.across(e).norm()};
     c.e = e;
+    c.nk = view_.turn_k * k.normal;
+    c.nm = view_.turn_m * -m.normal;
     c.middle = xm;
     c.rm = 0;
     if (view_.circles) {
@@ -277,12 +280,11 @@ class RingSearch {
     return true;
   }
 
-  // Circles are kept by the angle they were asked for. Chosen are those asked for in a sector, and some on
-  // either side, of a mate's points some that were asked for at azimuths near the sector's.
+  // Circles are numbered by the angle they were asked for. Chosen are those asked for in a sector, and some
+  // on either side, of a mate's points some that were asked for at azimuths near the sector's.
   void choose(const Sector& sector, double half) {
-    const auto before = [](const Circle& c, const Angle& a) { return cross(c.at, a) > 0; };
-    const Circle* const begin = circle_;
-    const Circle* const end = circle_ + count_;
+    const auto before = [&](int i, const Angle& a) { return cross(circle_[i].at, a) > 0; };
+    const int *const begin = order_, *const end = order_ + count_;
     const auto first = static_cast<int>(std::lower_bound(begin, end, sector.low, before) - begin),
                last = static_cast<int>(std::lower_bound(begin, end, sector.high, before) - begin);
     const double reach = std::max(kNearAzimuth, 2 * half);
@@ -293,21 +295,22 @@ class RingSearch {
     };
     chosen_ = 0;
     for (int i = first - 1, beside = 0; i >= 0 && beside < kBeside; --i) {
-      const bool counts = near(circle_[i]);
-      if (counts || first - i <= kBeside) which_[chosen_++] = i;
+      const bool counts = near(circle_[order_[i]]);
+      if (counts || first - i <= kBeside) which_[chosen_++] = order_[i];
       beside += counts;
     }
-    for (int i = first; i < last; ++i) which_[chosen_++] = i;
+    for (int i = first; i < last; ++i) which_[chosen_++] = order_[i];
     for (int i = last, beside = 0; i < count_ && beside < kBeside; ++i) {
-      const bool counts = near(circle_[i]);
-      if (counts || i - last < kBeside) which_[chosen_++] = i;
+      const bool counts = near(circle_[order_[i]]);
+      if (counts || i - last < kBeside) which_[chosen_++] = order_[i];
       beside += counts;
     }
   }
   void insert(const Circle& c) {
-    int at = count_++;
-    for (; at > 0 && cross(c.at, circle_[at - 1].at) > 0; --at) circle_[at] = circle_[at - 1];
-    circle_[at] = c;
+    int at = count_;
+    for (; at > 0 && cross(c.at, circle_[order_[at - 1]].at) > 0; --at) order_[at] = order_[at - 1];
+    order_[at] = count_;
+    circle_[count_++] = c;
   }
 
   // Over the angles of a sector.
@@ -401,45 +404,56 @@ class RingSearch {
     return 0;
   }
 
+  // The same along the meridian of a body of revolution, `axis` its own, or of a ball, any axis.
+  double meridian_bend(const Shape& shape, const Vec3& e, const Vec3& axis, double reach) const {
+    const double cosine = e.dot(axis), sine = e.cross(axis).norm();
+    const double radius = shape.proofs.sphere ? 0 : shape.profile_radii.within(cosine, sine, kChord * reach);
+    if (!(sine > kNoDirection)) return radius;
+    return std::max(radius, least_bend(shape, e, (axis - cosine * e) / sine, reach, false));
+  }
+
   // Balls that touch two circles from inside, wherever they and the sector's directions lie on the meridians:
   // their centres take the circles' place. Returns the sum of the balls' radii, K's and M's.
   double round_off(const Sector& sector, const Angle& at, const Vec3& u, const Reach& over, Circle* one,
                    Circle* two) const {
-    const auto away = [](double x, double y) { return std::sqrt(square(x) + square(y)); };
+    // By how much angles from an axis differ, as chords.
+    const auto apart = [](const Vec3& axis, const Vec3& x, const Vec3& y) {
+      const double s = x.cross(axis).norm() - y.cross(axis).norm(), c = axis.dot(x - y);
+      return std::sqrt(s * s + c * c);
+    };
+    const Vec3 e = at.s * u + at.c * view_.axis;
     double range = 0, asked = 0;
     for (const Angle* a : {&sector.low, &sector.high})
-      range = std::max(range, away(a->c - at.c, a->s - at.s));
-    for (const Circle* c : {one, two}) asked = std::max(asked, away(c->at.c - at.c, c->at.s - at.s));
-    const Vec3 e = at.s * u + at.c * view_.axis, along = at.c * u - at.s * view_.axis;
+      range = std::max(range, std::sqrt(square(a->c - at.c) + square(a->s - at.s)));
+    for (const Circle* c : {one, two}) asked = std::max(asked, apart(view_.axis, c->nk, e));
     const Mat3 to_k = view_.turn_k.transpose(), to_m = view_.turn_m.transpose();
-    double of_k = view_.scale_k * least_bend(*view_.k, to_k * e, to_k * along, std::max(range, asked), false);
+    double of_k =
+        view_.scale_k * meridian_bend(*view_.k, to_k * e, view_.k->revolution.axis, std::max(range, asked));
     of_k = std::max(0.0, of_k - view_.ball_k);
     for (Circle* c : {one, two}) {
-      c->r -= of_k * c->at.s;
-      c->z -= of_k * c->at.c;
+      c->r -= of_k * view_.across(c->nk).norm();
+      c->z -= of_k * c->nk.dot(view_.axis);
     }
     double of_m;
+    asked = 0;
     if (view_.circles) {
-      const double y = e.dot(view_.mate_axis), across = e.cross(view_.mate_axis).norm();
-      asked = 0;
-      for (const Circle* c : {one, two})
-        asked =
-            std::max(asked, away(c->e.dot(view_.mate_axis) - y, c->e.cross(view_.mate_axis).norm() - across));
+      const Vec3& axis = view_.mate_axis;
+      for (const Circle* c : {one, two}) asked = std::max(asked, apart(axis, c->nm, e));
       range += view_.tilt * sector.half / over.across;
-      of_m = view_.scale_m * least_bend(*view_.m, to_m * -e, to_m * ((view_.mate_axis - y * e) / across),
-                                        std::max(range, asked), false);
+      const Vec3 own = view_.m->proofs.sphere ? Vec3(to_m * axis) : view_.m->revolution.axis;
+      of_m = view_.scale_m * meridian_bend(*view_.m, to_m * -e, own, std::max(range, asked));
       of_m = std::max(0.0, of_m - view_.ball);
-      for (const Circle* c : {one, two}) of_m = std::min(of_m, c->rm / c->e.cross(view_.mate_axis).norm());
+      for (const Circle* c : {one, two}) of_m = std::min(of_m, c->rm / c->nm.cross(axis).norm());
       for (Circle* c : {one, two}) {
-        c->rm -= of_m * c->e.cross(view_.mate_axis).norm();
-        c->k += of_m * c->e.dot(view_.mate_axis) * view_.mate_axis;
+        c->rm -= of_m * c->nm.cross(axis).norm();
+        c->k += of_m * c->nm.dot(axis) * axis;
       }
     } else {
-      asked = std::max((one->e - e).norm(), (two->e - e).norm());
+      for (const Circle* c : {one, two}) asked = std::max(asked, (c->nm - e).norm());
       range += sector.half;
-      of_m = view_.scale_m * least_bend(*view_.m, to_m * -e, along, std::max(range, asked), true);
+      of_m = view_.scale_m * least_bend(*view_.m, to_m * -e, Vec3::Zero(), std::max(range, asked), true);
       of_m = std::max(0.0, of_m - view_.ball);
-      for (Circle* c : {one, two}) c->k += of_m * c->e;
+      for (Circle* c : {one, two}) c->k += of_m * c->nm;
     }
     return of_k + of_m;
   }
@@ -612,6 +626,7 @@ class RingSearch {
   SurfacePoint on_k_, on_m_, last_k_, last_m_;
   int count_ = 0, queries_ = 0;
   Circle circle_[kMostCircles];
+  int order_[kMostCircles];
   int chosen_ = 0, which_[kMostCircles];
   Meridian meridian_[kMostCircles];  // of the chosen
 };

@@ -17,7 +17,9 @@ namespace nurbs {
 // hull: exact and cheap. Over an interval of phi R is lowered by what it may change, which is only as much as
 // the axes are apart, or two circles are weighed to second order, in which what they change by cancels at the
 // minimum; intervals, and those of angles from the axis, are halved until that is little enough. No surface
-// is evaluated for it but where a new circle is needed. A ball is of revolution about any axis: K's is taken.
+// is evaluated for it but where a new circle is needed. Between two circles a body bends as its meridian does
+// (body/profile_radii.h). A ball is of
+// revolution about any axis: K's is taken.
 bool search_rings(const PairFrame& pair, double tolerance, PolytopeResult* result);
 
 }  // namespace nurbs

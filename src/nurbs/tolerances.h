@@ -130,6 +130,9 @@ constexpr int kMeridianDepth = 40;         // of bisection
 constexpr double kMeridianEnd = 1e-3;      // parameter: a maximum this near an end splits no piece
 constexpr double kMeridianTurn = 1e-14;    // parameter: step round the axis that is round-off
 
+constexpr int kProfileCells = 1024;     // of their normals, a cell being some 2 to 4 mrad
+constexpr double kProfileKink = 2e-14;  // rad: normals that are one
+
 // --- support mapping
 constexpr int kSupportIterations = 60;  // 3 to 5 are usual; hops between patches count too
 constexpr double kSlopeTolerance =

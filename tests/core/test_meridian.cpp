@@ -118,5 +118,62 @@ TEST(Meridian, is_of_bodies_of_revolution_only) {
   EXPECT_TRUE(make_shape("oval", surfaces)->meridian.empty());
 }
 
+// From one direction to another over a meridian the support rises at least as a ball of the least radius
+// between them has it: H(a + t) >= H(a) cos t + H'(a) sin t + R (1 - cos t), H' from the support point.
+TEST(ProfileRadii, are_bounds_of_the_support) {
+  Random random(7);
+  for (const ShapePointer& shape : bodies_of_revolution(random)) {
+    const double noise = 32 * kRoundoff * shape->bounding_radius;
+    const Vec3 axis = shape->revolution.axis, across = axis.unitOrthogonal();
+    const auto at = [&](double a) { return Vec3(std::cos(a) * axis + std::sin(a) * across); };
+    const auto support = [&](double a, Vec3* point) {
+      MeridianSupport found;
+      if (!find_meridian_support(shape->meridian, at(a), shape->bounding_radius, nullptr, &found))
+        return false;
+      *point = evaluate0(shape->patches[found.where.patch], found.where.u, found.where.v);
+      return true;
+    };
+    int known = 0;
+    for (int k = 0; k < 20000; ++k) {
+      const double a = random.uniform(0.06, M_PI - 0.06), t = random.sign() * random.log_uniform(1e-4, 0.05);
+      const double radius = shape->profile_radii.within(std::cos(a), std::sin(a), std::abs(t));
+      Vec3 x, y;
+      if (!(radius > 0) || !support(a, &x) || !support(a + t, &y)) continue;
+      ++known;
+      const double h = at(a).dot(x), slope = at(a + 0.5 * M_PI).dot(x);
+      const double least = h * std::cos(t) + slope * std::sin(t) + radius * 2 * std::pow(std::sin(t / 2), 2);
+      ASSERT_GE(at(a + t).dot(y), least - noise) << shape->name << " " << a << " " << t << " " << radius;
+    }
+    if (shape->curvature.min_radius > 0) {
+      EXPECT_GT(known, 15000) << shape->name;
+    }
+  }
+}
+
+// Semi-axes 1 and c: W = c^2 / H^3, H^2 = c^2 cos^2 + sin^2.
+TEST(ProfileRadii, of_spheroids_are_tight) {
+  for (const double c : {0.03, 0.2, 3.0}) {
+    const ShapePointer shape = make_shape("spheroid", revolved_ellipsoid(1, c));
+    ASSERT_FALSE(shape->profile_radii.least.empty());
+    for (double a = 0; a < M_PI; a += 0.01) {
+      const double h = std::hypot(c * std::cos(a), std::sin(a)), w = c * c / (h * h * h);
+      const double radius = shape->profile_radii.within(std::cos(a), std::sin(a), 0);
+      EXPECT_LE(radius, w * (1 + 1e-6)) << c << " " << a;
+      EXPECT_GE(radius, (c < 0.1 ? 0.6 : 0.9) * w) << c << " " << a;
+    }
+  }
+}
+
+// Kinks have none: the fans of normals at a cone's tip and rim, a lens's edge.
+TEST(ProfileRadii, are_zero_at_kinks) {
+  Random random(8);
+  const Solid cone = test::cone(random, 1, 1, 1);
+  for (const float r : cone.shape->profile_radii.least) EXPECT_EQ(r, 0);
+  const Solid sharp = test::lens(random, 1.5);
+  ASSERT_FALSE(sharp.shape->profile_radii.least.empty());
+  EXPECT_EQ(sharp.shape->profile_radii.within(0, 1, 0.01), 0);
+  EXPECT_NEAR(sharp.shape->profile_radii.within(0.99, std::sqrt(1 - 0.99 * 0.99), 0.01), 1.5, 0.01);
+}
+
 }  // namespace
 }  // namespace nurbs

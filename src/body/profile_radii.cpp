@@ -1,0 +1,234 @@
+// See profile_radii.h. Of a rational curve (R, Z) / w, with C = (R, Z, w): the velocity is N / w^2, N = (R'w
+// - R w', Z'w - Z w'), and its curvature radius |N|^3 / (w^3 det(C, C', C'')).
+#include "body/profile_radii.h"
+
+#include <algorithm>
+#include <cmath>
+#include <tuple>
+#include <utility>
+
+#include "nurbs/bernstein.h"
+#include "nurbs/tolerances.h"
+
+namespace nurbs {
+namespace {
+
+constexpr int kMostDepth = 18;           // halvings of a piece
+constexpr double kLeafCells = 0.5;       // that a leaf's normals may cover
+constexpr double kLeafSpread = 0.98;     // least over largest radius of a leaf ...
+constexpr double kNearlyStraight = 1e3;  // ... unless it bends by less than this over the body's size
+constexpr double kSameEnd = 1e-12;       // of the body's size
+constexpr double kBesideCell = 1e-9;     // cells: round-off of a normal's place
+
+using Row = Bernstein<double>;
+using Rows = Bernstein<Vec2>;
+
+// From 0, against the axis, to 1, along it: monotone in the angle. Normals that round-off turns beyond the
+// axis belong to its end.
+double place_of(const Vec2& n) {
+  if (!(n[0] > 0)) return n[1] > 0 ? 1 : 0;
+  return 0.5 * (1 + n[1] / (n[0] + std::abs(n[1])));
+}
+
+double largest(const Row& row) {
+  double most = 0;
+  for (const double x : row) most = std::max(most, std::abs(x));
+  return most;
+}
+double longest(const Rows& rows) {
+  double most = 0;
+  for (const Vec2& x : rows) most = std::max(most, x.norm());
+  return most;
+}
+
+Vec2 square_to(const Vec2& tangent, double side) {
+  return side * Vec2(tangent[1], -tangent[0]);
+}
+
+// A stretch of a piece, lengths over the body's size.
+struct Leaf {
+  Rows n;  // velocity times w^2
+  Row det, w;
+};
+
+class Painter {
+ public:
+  explicit Painter(double size) : size_(size), cell_(kProfileCells, kFarAway) {}
+
+  // Paints a piece; false where its normals cannot be told.
+  bool paint(const Meridian::Piece& piece, const Vec2& outward) {
+    Bernstein<Vec3> c;
+    Row r, z, w;
+    for (int i = 0; i <= piece.degree; ++i) {
+      c.emplace_back(piece.r[i] / size_, piece.z[i] / size_, piece.w[i]);
+      r.push_back(c[i][0]);
+      z.push_back(c[i][1]);
+      w.push_back(c[i][2]);
+    }
+    const auto by = [](double a, double b) { return a * b; };
+    const Row nr = difference(multiply(derivative(r), w, by), multiply(r, derivative(w), by)),
+              nz = difference(multiply(derivative(z), w, by), multiply(z, derivative(w), by));
+    const Bernstein<Vec3> first = derivative(c), second = derivative(first);
+    Leaf leaf;
+    for (size_t i = 0; i < nr.size(); ++i) leaf.n.emplace_back(nr[i], nz[i]);
+    leaf.det = multiply(multiply(c, first, [](const Vec3& a, const Vec3& b) -> Vec3 { return a.cross(b); }),
+                        second, [](const Vec3& a, const Vec3& b) { return a.dot(b); });
+    leaf.w = w;
+    double most = 0, most1 = 0, most2 = 0;
+    for (const Vec3& x : c) most = std::max(most, x.norm());
+    for (const Vec3& x : first) most1 = std::max(most1, x.norm());
+    for (const Vec3& x : second) most2 = std::max(most2, x.norm());
+    noise_n_ = kRoundoff * most * most1;
+    noise_det_ = kRoundoff * most * most1 * most2;
+    const Vec2 middle = middle_of(leaf.n);
+    side_ = square_to(middle, 1).dot(outward) > 0 ? 1 : -1;
+    add_end(r.front() / w.front(), z.front() / w.front(), end_of(leaf.n.begin(), leaf.n.end()));
+    add_end(r.back() / w.back(), z.back() / w.back(), end_of(leaf.n.rbegin(), leaf.n.rend()));
+    return examine(std::move(leaf), kMostDepth);
+  }
+
+  // The fans of normals at kinks, where the radius is 0. Ends without another meet the axis, or the rim of a
+  // flat face square to it.
+  bool paint_kinks() {
+    double low = kFarAway, high = -kFarAway;
+    for (const End& e : ends_) {
+      low = std::min(low, e.at[1]);
+      high = std::max(high, e.at[1]);
+    }
+    for (const End& e : ends_) {
+      bool met = false;
+      for (const End& f : ends_)
+        if (&e != &f && (e.at - f.at).norm() <= kSameEnd) {
+          met = true;
+          fan(e.normal, f.normal);
+        }
+      const bool top = e.at[1] >= high - kSameEnd, bottom = e.at[1] <= low + kSameEnd;
+      if (e.at[0] <= kSameEnd)
+        fan(e.normal, Vec2(0, e.at[1] > 0.5 * (low + high) ? 1 : -1));
+      else if (!met && top != bottom)
+        fan(e.normal, Vec2(0, top ? 1 : -1));
+      else if (!met)
+        return false;
+    }
+    return true;
+  }
+
+  std::vector<float> radii() const {
+    std::vector<float> least;
+    for (const double x : cell_)
+      least.push_back(x < kFarAway ? std::nextafter(static_cast<float>(size_ * x), 0.0F) : 0.0F);
+    return least;
+  }
+
+ private:
+  struct End {
+    Vec2 at, normal;
+  };
+
+  void add_end(double r, double z, const Vec2& velocity) {
+    ends_.push_back({Vec2(r, z), square_to(velocity, side_).normalized()});
+  }
+  // The first velocity that is one.
+  template <class Iterator>
+  Vec2 end_of(Iterator from, Iterator to) const {
+    while (from + 1 != to && !(from->norm() > noise_n_)) ++from;
+    return *from;
+  }
+  static Vec2 middle_of(const Rows& n) {
+    Vec2 sum = Vec2::Zero();
+    for (const Vec2& x : n) sum += x;
+    return sum;
+  }
+
+  void fan(const Vec2& a, const Vec2& b) {
+    if (std::abs(std::atan2(a[0] * b[1] - a[1] * b[0], a.dot(b))) > kProfileKink)
+      put(place_of(a), place_of(b), 0);
+  }
+  void put(double from, double to, double radius) {
+    if (from > to) std::swap(from, to);
+    const int first = std::max(0, static_cast<int>(std::floor(from * kProfileCells - kBesideCell))),
+              last =
+                  std::min(kProfileCells - 1, static_cast<int>(std::floor(to * kProfileCells + kBesideCell)));
+    for (int k = first; k <= last; ++k) cell_[k] = std::min(cell_[k], radius);
+  }
+
+  bool examine(Leaf leaf, int depth) {
+    const Vec2 sum = middle_of(leaf.n);
+    const double length = sum.norm();
+    const Vec2 along = sum / length, across(-along[1], along[0]);
+    double slowest = kFarAway, left = 0, right = 0;  // tangents of the velocities' angles from the middle
+    bool told = length > 0;
+    for (const Vec2& x : leaf.n) {
+      const double forward = x.dot(along), side = x.dot(across);
+      slowest = std::min(slowest, forward);
+      if (x.norm() <= noise_n_) continue;  // a cusp's, or a pole's: says nothing of the direction
+      if (!(forward > 0)) {
+        told = false;
+        continue;
+      }
+      left = std::max(left, side / forward);
+      right = std::min(right, side / forward);
+    }
+    slowest = std::max(0.0, slowest - noise_n_);
+    const auto [least_w, most_w] = std::minmax_element(leaf.w.begin(), leaf.w.end());
+    const double bend = largest(leaf.det) + noise_det_;
+    const double w = *most_w, radius = slowest * slowest * slowest / (w * w * w * bend);
+    double from = 0, to = 1;
+    if (told) {
+      from = place_of(square_to(along + left * across, side_));
+      to = place_of(square_to(along + right * across, side_));
+    }
+    bool done = told && std::abs(to - from) * kProfileCells <= kLeafCells;
+    if (done && radius < kNearlyStraight) {
+      double least_bend = kFarAway;
+      for (const double x : leaf.det) least_bend = std::min(least_bend, std::abs(x));
+      const double fastest = longest(leaf.n), v = *least_w;
+      done = radius * v * v * v * least_bend >= kLeafSpread * fastest * fastest * fastest;
+    }
+    if (done || (told && depth == 0)) {
+      put(from, to, radius);
+      return true;
+    }
+    if (depth == 0) return false;
+    Leaf other;
+    std::tie(leaf.n, other.n) = halve(std::move(leaf.n));
+    std::tie(leaf.det, other.det) = halve(std::move(leaf.det));
+    std::tie(leaf.w, other.w) = halve(std::move(leaf.w));
+    return examine(std::move(leaf), depth - 1) && examine(std::move(other), depth - 1);
+  }
+
+  const double size_;
+  std::vector<double> cell_;  // radius over the body's size
+  std::vector<End> ends_;
+  double side_ = 1, noise_n_ = 0, noise_det_ = 0;
+};
+
+}  // namespace
+
+double ProfileRadii::within(double cosine, double sine, double reach) const {
+  if (least.empty() || !(reach < 0.5)) return 0;
+  const double c = std::cos(reach), s = std::sin(reach);
+  const Vec2 low(sine * c - cosine * s, cosine * c + sine * s),
+      high(sine * c + cosine * s, cosine * c - sine * s);
+  const double from = std::min(place_of(low), place_of(high)), to = std::max(place_of(low), place_of(high));
+  const int first = std::max(0, static_cast<int>(std::floor(from * kProfileCells - kBesideCell))),
+            last =
+                std::min(kProfileCells - 1, static_cast<int>(std::floor(to * kProfileCells + kBesideCell)));
+  float radius = least[first];
+  for (int k = first + 1; k <= last; ++k) radius = std::min(radius, least[k]);
+  return radius;
+}
+
+ProfileRadii make_profile_radii(const Meridian& m, const std::vector<BezierPatch>& patches, double size) {
+  if (m.empty()) return {};
+  Painter painter(size);
+  for (const Meridian::Piece& piece : m.pieces) {
+    const Jet1 middle = evaluate1(patches[m.sectors[piece.first_sector].patch], 0.5, 0.5);
+    const Vec3 at = m.axes * (middle.s - m.point), n = m.axes * middle.su.cross(middle.sv);
+    if (!painter.paint(piece, Vec2(n.head<2>().dot(at.head<2>().normalized()), n[2]))) return {};
+  }
+  if (!painter.paint_kinks()) return {};
+  return {painter.radii()};
+}
+
+}  // namespace nurbs

@@ -1,0 +1,26 @@
+// How strongly a meridian bends, by the angle of its normal from the axis: what rings of directions about the
+// axis (contact/ring_search.h) know of a body of revolution between two of its circles.
+#pragma once
+
+#include <vector>
+
+#include "body/meridian.h"
+
+namespace nurbs {
+
+// With H(alpha) the support function of a profile in its half plane, alpha the angle from the axis,
+//     H'' + H >= the cell's value   (as a measure: a line, or a bridged dent, adds to it)
+// for all alpha of a cell. Radii are those of all points that have their normals there, proven from Bernstein
+// coefficients; cells that kinks of more than kProfileKink reach into have 0.
+struct ProfileRadii {
+  std::vector<float> least;  // length; empty: nothing is known
+
+  // For all angles within `reach` (rad) of the one of this cosine and sine; 0 where nothing is known.
+  double within(double cosine, double sine, double reach) const;
+};
+
+// Of an empty meridian empty. `patches` say which side is outside. About 1 ms.
+ProfileRadii make_profile_radii(const Meridian& meridian, const std::vector<BezierPatch>& patches,
+                                double size);
+
+}  // namespace nurbs
