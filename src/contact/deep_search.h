@@ -22,11 +22,13 @@ namespace nurbs {
 //   * caps about local minima. If W_A + W_B >= m (as forms) for all directions within t of d, then by p'' + p
 //     >= m along great circles p there is at least the solution of y'' + y = m with y(0) = d . (a - b), a and
 //     b any points of the bodies, and y'(0) = -s, s a bound of p's slope at d: |a - b across d| and the
-//     largest curvature radii times the angles between d and the normals at a and b. m comes from the nodes
-//     and cells nearest to d, in steps over their caps.
-// Hypotheses: those of the inner maps, and finite curvature radii; both are checked. `proof`, if asked for,
-// is filled for the steps to come: cells then have to lie above T by a margin, and caps are cut, which costs
-// some more cells; its level is 0 where none is to be had, as of two minima as good as each other.
+//     largest curvature radii times the angles between d and the normals at a and b. m comes from W at a and
+//     b, less its rate times the angle, as far as that is known, then from the nodes and cells nearest to d,
+//     in steps over their caps.
+// Hypotheses: those of the inner maps and rates, and finite curvature radii; all are checked. `proof`, if
+// asked for, is filled for the steps to come: cells then have to lie above T by a margin, and caps are cut,
+// which costs some more cells; its level is 0 where none is to be had, as of two minima as good as each
+// other.
 struct DeepProof;
 bool search_deep(const PairFrame& pair, double tolerance, JointSolution* best, DeepProof* proof = nullptr);
 

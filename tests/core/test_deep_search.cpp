@@ -12,6 +12,7 @@
 #include "contact/deep_search.h"
 #include "contact/pair_search.h"
 #include "contact/polytope.h"
+#include "shapes/random_pebble.h"
 #include "shapes/revolved.h"
 #include "support/bodies.h"
 #include "support/pairs.h"
@@ -187,6 +188,35 @@ TEST(DeepSearch, no_direction_overlaps_by_less_than_is_proven) {
     EXPECT_GE(s.bracket.upper, hull.bracket.lower - noise) << k;
   }
   EXPECT_GT(proven, tried / 2);
+}
+
+// Of pebbles W changes much within the stretches' caps. At the minimum it is known, and so is its rate.
+TEST(DeepSearch, proves_minima_of_pebbles) {
+  Random random(79);
+  const ShapePointer shapes[] = {make_shape("pebble", random_pebble(1, PebbleForm())),
+                                 make_shape("other", random_pebble(3, PebbleForm()))};
+  int proven = 0;
+  for (int k = 0; k < 400; ++k) {
+    const Shape& shape = *shapes[k % 2];
+    Pair p;
+    p.a.shape = p.b.shape = &shape;
+    p.b.scale = random.log_uniform(0.5, 2);
+    p.a.q = random.turn();
+    p.b.q = random.turn();
+    p.b.x = random.uniform(0, 0.4) * shape.inner_radius * random.direction();
+    const PairFrame pair(p.a, p.b);
+    const double tolerance = 1e-9 * pair.size;
+    JointSolution s;
+    s.iterations = 0;
+    if (!search_deep(pair, tolerance, &s)) continue;
+    ++proven;
+    const auto overlap = [&](const Vec3& d) { return overlap_along(p.a, p.b, pair.axes_a * d); };
+    const double least = -s.bracket.upper, noise = 1e-14 * pair.reach;
+    for (int i = 0; i < 100; ++i) ASSERT_GE(overlap(random.direction()), least - noise) << k;
+    for (int i = 0; i < 100; ++i)
+      ASSERT_GE(overlap(near(s.normal, random.log_uniform(1e-6, 0.3), random)), least - noise) << k;
+  }
+  EXPECT_GT(proven, 340);
 }
 
 // Bodies with flats, poles, creases: what the polytope's caps about minima prove, too.
