@@ -15,7 +15,7 @@ namespace nurbs {
 namespace {
 
 constexpr int kCaps = static_cast<int>(kInnerCaps.size()), kStretches = static_cast<int>(kStretchCaps.size());
-constexpr double kAround = 0.65;        // rad: the widest cap, leaves of 0.1 and a node's own reach
+constexpr int kBlock = 16;              // nodes painted side by side
 constexpr double kWidestKink = 0.3;     // rad: bodies of sharper edges have next to nothing to tell
 constexpr double kLeafCone = 0.015;     // rad: leaves as narrow are not halved for their eigenvalues ...
 constexpr double kLeafTightness = 1.1;  // ... nor those that are known as well
@@ -28,22 +28,6 @@ constexpr float kLarge = std::numeric_limits<float>::max();
 
 float down(double x) {
   return x > 0 ? std::nextafter(static_cast<float>(std::min(x, 1e30)), 0.0f) : 0.0f;
-}
-
-// Of each of the atlas's directions those within kAround, all that a narrow leaf nearest to it may touch: the
-// same for all shapes.
-const std::vector<std::vector<int>>& neighbours(const DirectionAtlas& atlas) {
-  static const std::vector<std::vector<int>> around = [&] {
-    const int count = atlas.nodes();
-    std::vector<Vec3> d(count);
-    for (int i = 0; i < count; ++i) d[i] = atlas.direction(i).normalized();
-    std::vector<std::vector<int>> near(count);
-    for (int i = 0; i < count; ++i)
-      for (int j = 0; j < count; ++j)
-        if (d[i].dot(d[j]) >= std::cos(kAround)) near[i].push_back(j);
-    return near;
-  }();
-  return around;
 }
 
 // The largest kink of the joints that a leaf touches.
@@ -72,72 +56,84 @@ double widest_kink(const Shape& shape) {
   return kGapsCrossed * std::max(shape.proofs.opening, shape.proofs.closing);
 }
 
-// The radii.
+// The radii. Nodes lie in blocks, neighbours mostly: those too far from a leaf are left out as one.
 class NodePainter {
  public:
-  NodePainter(const Shape& shape, InnerMap& map) : shape_(shape), map_(map), count_(map.nodes.size()) {
-    for (auto& n : normal_) n.resize(count_);
-    for (std::size_t i = 0; i < count_; ++i)
-      for (int k = 0; k < 3; ++k) normal_[k][i] = static_cast<float>(map.nodes[i].normal[k]);
-    std::array<float, kCaps> none;
-    none.fill(kLarge);
-    least_.assign(count_, none);
-    cosine_.resize(count_);
+  NodePainter(const Shape& shape, InnerMap& map) : shape_(shape), map_(map) {
+    const std::size_t count = map.nodes.size();
+    block_.resize((count + kBlock - 1) / kBlock);
+    for (std::size_t b = 0; b < block_.size(); ++b) {
+      Block& block = block_[b];
+      Vec3 sum = Vec3::Zero();
+      for (int i = 0; i < kBlock; ++i) {
+        const Vec3& n = map.nodes[std::min(b * kBlock + i, count - 1)].normal;
+        sum += n;
+        for (int k = 0; k < 3; ++k) block.normal[k][i] = static_cast<float>(n[k]);
+        for (int k = 0; k < kCaps; ++k) block.least[k][i] = kLarge;
+      }
+      block.middle = sum.normalized();
+      double least = 1;
+      for (int i = 0; i < kBlock; ++i)
+        least = std::min(least, block.middle.dot(map.nodes[std::min(b * kBlock + i, count - 1)].normal));
+      block.cosine = least - kCosineRoundoff;
+      block.sine = std::sqrt(std::max(0.0, 1 - block.cosine * block.cosine));
+    }
   }
 
   void paint(const std::vector<Leaf>& leaves) {
     for (const Leaf& leaf : leaves) {
       const CellBounds& b = leaf.bounds;
-      const double crease = b.regular && kink_at(shape_, leaf.cell) > kNoKink ? widest_kink(shape_) : 0;
-      see(b.axis, b.regular ? threshold(b.cone + crease + kInnerCaps.back()) : -2);
-      lower(b.regular ? b.cone : M_PI, b.regular ? down(std::max(b.min_radius, upright_least(b))) : 0);
-      if (crease > 0) lower(b.cone + crease, 0);
+      if (!b.regular) {
+        lower(b.axis, M_PI, 0);
+        continue;
+      }
+      lower(b.axis, b.cone, down(std::max(b.min_radius, upright_least(b))));
+      if (kink_at(shape_, leaf.cell) > kNoKink) lower(b.axis, b.cone + widest_kink(shape_), 0);
     }
     const double all = shape_.joints.none() ? shape_.patch_curvature.min_radius : 0;
-    for (std::size_t i = 0; i < count_; ++i)
-      for (int k = 0; k < kCaps; ++k) map_.nodes[i].radius[k] = std::max(down(all), or_none(least_[i][k]));
+    for (std::size_t i = 0; i < map_.nodes.size(); ++i)
+      for (int k = 0; k < kCaps; ++k)
+        map_.nodes[i].radius[k] = std::max(down(all), or_none(block_[i / kBlock].least[k][i % kBlock]));
   }
 
  private:
-  // The nodes whose normals have a cosine above `from` with a leaf's axis.
-  void see(const Vec3& axis, float from) {
+  struct Block {
+    float normal[3][kBlock];
+    float least[kCaps][kBlock];
+    Vec3 middle;
+    double cosine, sine;  // of the angle from it to the furthest
+  };
+
+  // What may touch a node's cap is within `cone` of the axis.
+  void lower(const Vec3& axis, double cone, float radius) {
     const auto x = static_cast<float>(axis[0]), y = static_cast<float>(axis[1]),
                z = static_cast<float>(axis[2]);
-    seen_.clear();
-    const auto look = [&](int i) {
-      cosine_[i] = x * normal_[0][i] + y * normal_[1][i] + z * normal_[2][i];
-      if (cosine_[i] >= from) seen_.push_back(i);
-    };
-    if (from > narrow_) {
-      for (const int i : neighbours(shape_.atlas)[shape_.atlas.nearest(axis)]) look(i);
-    } else {
-      for (int i = 0; i < static_cast<int>(count_); ++i) look(i);
-    }
-  }
-  // What may touch a cap is within `cone` of the axis.
-  void lower(double cone, float radius) {
     float within[kCaps];
     for (int k = 0; k < kCaps; ++k) within[k] = threshold(cone + kInnerCaps[k]);
-    for (const int i : seen_)
-      for (int k = kCaps - 1; k >= 0 && cosine_[i] >= within[k]; --k)
-        least_[i][k] = std::min(least_[i][k], radius);
+    const double widest = cone + kInnerCaps.back(), c = std::cos(widest), s = std::sin(widest);
+    const bool all = widest >= 0.5 * M_PI;
+    for (Block& block : block_) {
+      if (!all && axis.dot(block.middle) < c * block.cosine - s * block.sine) continue;
+      for (int i = 0; i < kBlock; ++i) {
+        const float cosine = x * block.normal[0][i] + y * block.normal[1][i] + z * block.normal[2][i];
+        for (int k = 0; k < kCaps; ++k) {
+          const float seen = cosine >= within[k] ? radius : kLarge;
+          block.least[k][i] = seen < block.least[k][i] ? seen : block.least[k][i];
+        }
+      }
+    }
   }
 
   const Shape& shape_;
   InnerMap& map_;
-  const std::size_t count_;
-  std::array<std::vector<float>, 3> normal_;
-  std::vector<std::array<float, kCaps>> least_;
-  std::vector<float> cosine_;
-  std::vector<int> seen_;
-  const float narrow_ = static_cast<float>(std::cos(kAround - M_SQRT2 / kAtlasCells) + kCosineRoundoff);
+  std::vector<Block> block_;
 };
 
 // The stretches.
 class StretchPainter {
  public:
   StretchPainter(const Shape& shape, InnerMap& map)
-      : shape_(shape), cells_(map.stretches), nearest_(cells_.size(), -2) {
+      : shape_(shape), cells_(map.stretches), nearest_(cells_.size(), -2), most_(cells_.size()) {
     for (InnerStretch& s : cells_) s.least.fill(kLarge);
   }
 
@@ -149,6 +145,8 @@ class StretchPainter {
     }
     begin();
     for (const Leaf& leaf : leaves) limit(leaf);
+    for (std::size_t i = 0; i < cells_.size(); ++i)
+      for (int k = 0; k < kStretches; ++k) cells_[i].most[k] = down(most_[i][k] * (1 - 1e-6));
     const float all = down(shape_.joints.none() ? shape_.patch_curvature.min_radius : 0);
     for (InnerStretch& s : cells_)
       for (int k = 0; k < kStretches; ++k) {
@@ -210,7 +208,7 @@ class StretchPainter {
       for (int k = 0; k < 3; ++k) s.along[k] = static_cast<float>(f[k]);
       for (int k = 0; k < kStretches; ++k) {
         s.least[k] = some ? down(kLeastShare * or_none(s.least[k])) : 0;
-        s.most[k] = s.least[k] > 0 ? 1e30f : 0;
+        most_[i][k] = s.least[k] > 0 ? kFarAway : 0;
       }
     }
   }
@@ -222,20 +220,24 @@ class StretchPainter {
   void limit(const Leaf& leaf) {
     const CellBounds& b = leaf.bounds;
     if (!b.regular) return;  // there the least is 0, and so is the most
-    const double c2 = std::cos(b.cone) * std::cos(b.cone), s2 = 1 - c2;
+    const double c2 = std::cos(b.cone) * std::cos(b.cone), s2 = 1 - c2, over = 1 / c2;
     const Vec3 &f1 = b.stretch.along, f2 = b.axis.cross(f1);
     visit(b, b.cone, [&](int cell, float, int first) {
       InnerStretch& s = cells_[cell];
       const Vec3 f(s.along[0], s.along[1], s.along[2]);
-      const double x = f.dot(f1), y = f.dot(f2), z = f.dot(b.axis);
+      const double x = f.dot(f1), y = f.dot(f2), z = f.dot(b.axis),
+                   tilted = (1 + 1 / kTiltShare) * z * z * s2;
       for (int k = first; k < kStretches; ++k) {
-        if (!(s.most[k] > 0)) continue;
-        double r = std::min<double>(s.most[k], b.stretch.most);
-        const double m = (s.least[k] + r * (1 + 1 / kTiltShare) * z * z * s2) / c2;
+        double& most = most_[cell][k];
+        if (!(most > 0)) continue;
+        most = std::min(most, b.stretch.most);
+        const double m = (s.least[k] + most * tilted) * over;
         const double d1 = b.stretch.most - m, d2 = b.stretch.least - m;
-        const double worth = x * x * d2 + y * y * d1;
-        r = d1 > 0 && d2 > 0 ? std::min(r, d1 * d2 / (worth * (1 + kTiltShare))) : 0;
-        s.most[k] = down(r * (1 - 1e-6));
+        const double worth = (x * x * d2 + y * y * d1) * (1 + kTiltShare);
+        if (!(d1 > 0 && d2 > 0))
+          most = 0;
+        else if (d1 * d2 < most * worth)
+          most = d1 * d2 / worth;
       }
     });
   }
@@ -243,6 +245,7 @@ class StretchPainter {
   const Shape& shape_;
   std::vector<InnerStretch>& cells_;
   std::vector<float> nearest_;
+  std::vector<std::array<double, kStretches>> most_;
 };
 
 }  // namespace
