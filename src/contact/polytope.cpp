@@ -751,7 +751,7 @@ PolytopeResult solve_polytope(const PairFrame& pair, const Vec3& seed, double to
         search.run(enough, kAtPoles);
         best = search.result();
       }
-      if (!best.converged && search_rings(pair, tolerance, &best)) return best;
+      if (!best.converged && search_rings(pair, tolerance, false, &best)) return best;
     }
     if (started) search.run(enough, kHullVertices);
     const PolytopeResult result = search.result();
@@ -761,6 +761,7 @@ PolytopeResult solve_polytope(const PairFrame& pair, const Vec3& seed, double to
     if (best.converged || best.bracket.lower > enough || (started && !search.stalled())) break;
     from = best.bracket.direction + kHullTurn * (attempt + 1) * Vec3(0.36, -0.48, 0.8);
   }
+  if (!best.converged && !(best.bracket.lower > enough)) search_rings(pair, tolerance, true, &best);
   return best;
 }
 

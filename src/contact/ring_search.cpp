@@ -14,7 +14,8 @@ constexpr int kFirstSpent = 900;        // ... and those after which it ends ...
 constexpr double kHopeless = 0.1;       // ... where less than this times its share of all is closed
 constexpr int kDeepestSector = 60;      // halvings of the azimuth
 constexpr double kNearAxis = 0.2;       // sine between the axes up to which both bodies' circles are used
-constexpr double kNearlyAlike = 0.4;    // of the body's radius: what directions of a ring may differ by
+constexpr double kNearlyAlike = 0.1;    // of the body's radius: what directions of a ring may differ by ...
+constexpr double kHardlyAlike = 0.4;    // ... where nothing else did
 constexpr double kClosedShare = 0.9;    // of the tolerance at which a sector is closed ...
 constexpr double kMeridianShare = 0.4;  // ... and below which its width, not its circles, keeps it open
 constexpr double kLeastTilt = 3e-3;     // sine between the axes from which the mate's tip may do better
@@ -186,7 +187,7 @@ class RingSearch {
              (view_.circles ? view_.scale_m * view_.mate_error : 0.0);
   }
 
-  bool run(PolytopeResult* result) {
+  bool run(bool last, PolytopeResult* result) {
     const Vec3 e = view_.sign * result->bracket.direction;
     const double depth = -kCoreDepth * result->bracket.lower;
     view_.ball = std::min(view_.ball, depth);
@@ -197,7 +198,8 @@ class RingSearch {
     choose_mate(e);
     on_k_ = last_k_;
     on_m_ = last_m_;
-    if (!(differ() < kNearlyAlike * view_.scale_k * view_.k->bounding_radius)) return false;
+    const double alike = differ() / (view_.scale_k * view_.k->bounding_radius);
+    if (!(last ? alike >= kNearlyAlike && alike < kHardlyAlike : alike < kNearlyAlike)) return false;
     const double phi = azimuth(e);
     for (int k = 0; k < kFirstAngles; ++k) {
       const double angle = M_PI * k / (kFirstAngles - 1);
@@ -633,7 +635,7 @@ class RingSearch {
 
 }  // namespace
 
-bool search_rings(const PairFrame& pair, double tolerance, PolytopeResult* result) {
+bool search_rings(const PairFrame& pair, double tolerance, bool last, PolytopeResult* result) {
   for (const bool k_is_a : {true, false}) {
     const Shape& k = k_is_a ? *pair.a : *pair.b;
     if (!k.revolution.found || k.proofs.sphere) continue;
@@ -644,7 +646,7 @@ bool search_rings(const PairFrame& pair, double tolerance, PolytopeResult* resul
                own = k_is_a ? k.revolution.axis : Vec3(pair.turn * k.revolution.axis);
     const bool near = mate.revolution.found && own.cross(axis).norm() < kNearAxis;
     for (const bool core : {false, true})
-      if ((core ? round : near || !round) && RingSearch(pair, k_is_a, core, tolerance).run(result))
+      if ((core ? round : near || !round) && RingSearch(pair, k_is_a, core, tolerance).run(last, result))
         return true;
   }
   return false;

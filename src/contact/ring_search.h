@@ -7,7 +7,8 @@
 namespace nurbs {
 
 // Improves `result`, the polytope's answer for overlapping bodies of which A or B is one of revolution about
-// an axis: bracket and, where it closes, points and normal. True when the bracket is closed.
+// an axis: bracket and, where it closes, points and normal. True when the bracket is closed. `last`: the
+// polytope did not close it; rings may be less alike then.
 //
 // With e = d (or -d, for B) at azimuth phi and angle alpha from the axis of K, the body of revolution,
 // p >= r_K |e - (e.a) a| + z_K e.a - e.(o + x) for every circle (r_K, z_K) of K about its axis a and point x
@@ -20,6 +21,6 @@ namespace nurbs {
 // is evaluated for it but where a new circle is needed. Between two circles a body bends as its meridian does
 // (body/profile_radii.h). A ball is of
 // revolution about any axis: K's is taken.
-bool search_rings(const PairFrame& pair, double tolerance, PolytopeResult* result);
+bool search_rings(const PairFrame& pair, double tolerance, bool last, PolytopeResult* result);
 
 }  // namespace nurbs
