@@ -29,9 +29,12 @@ namespace {
 // functions.
 constexpr int kLadder[][2] = {{3, 1}, {4, 1}, {3, 2}, {4, 2}, {3, 3}, {4, 3}, {3, 4}};
 constexpr int kGaugeLadder[][2] = {{4, 4}, {4, 6}, {4, 8}, {4, 10}, {4, 12}};
-constexpr int kCostlySpans = 4;       // polynomial fits take 10 s from here on ...
-constexpr double kNear = 1.5;         // ... and need a last error of less than this times the tolerance
-constexpr double kCrystalNear = 1.3;  // ... and for a higher degree of crystals
+constexpr int kCostlySpans = 4;     // polynomial fits take 10 s from here on ...
+constexpr double kNear = 1.5;       // ... and need a last error of less than this times the tolerance
+constexpr double kNearMiss = 1.25;  // times the tolerance
+constexpr double kStricter[] = {0.8, 0.65,
+                                0.5};  // of the tolerance: what a rung is asked for that just misses it
+constexpr double kCrystalNear = 1.3;   // ... and for a higher degree of crystals
 constexpr double kPolynomialGain =
     1.6;                         // error of the first gauge function over polynomial ones', at the most
 constexpr int kMostDents = 2;    // polynomial bodies near enough but dented: no more are tried then
@@ -394,7 +397,10 @@ class HullFitter {
       if (any && spans > 1 && dents_ == kMostDents) break;
       if (any && spans > 1 && !polynomials_may_do(even_hull)) break;
       if (try_rung(degree, spans, target)) return best_;
-      if (best_.shape && further++ == kFurther) return best_;
+      if (!best_.shape || further++ < kFurther) continue;
+      if (best_.shape->patch_curvature.min_radius > 0) return best_;
+      further = 0;
+      break;  // no ball rolls inside of it: its contacts would be dear
     }
     for (int degree : {3, 4})
       if (!any && try_gauge(degree, options_.spans, even_hull)) return best_;
@@ -641,7 +647,17 @@ class HullFitter {
       accepted = accepted || good;
       return good;
     };
-    const bool good = accept(fit);
+    bool good = accept(fit);
+    // A rung that just misses the tolerance may be within it where more is asked of it.
+    for (const double share : kStricter) {
+      if (good || spans >= kCostlySpans || !(certified > tolerance_) || certified > kNearMiss * tolerance_)
+        break;
+      ConvexFit strict = fit_convex(cube, fit.points, offset, aimed_at(share * tolerance_));
+      if (!(strict.error < fit.error)) break;
+      fit = std::move(strict);
+      certified = 0;
+      good = accept(fit);
+    }
     double& error = polynomial_error_[spans - 1];
     error = std::min(error, std::max(fit.error, certified));
     if (good || fit.error <= tolerance_) raise_curvature(cube, fit, offset, free, accept);

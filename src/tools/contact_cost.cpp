@@ -109,7 +109,7 @@ std::string cost_class(const ContactCost& cost) {
   if (cost.cold < 250) return "about a sphere's";
   if (cost.turning < 800) return "low, as of smooth ovals";
   if (cost.turning < 5000) return "middling, as of bodies with flat faces or fine detail";
-  return "high: is a simpler body near enough (fit or simplify with a larger --tolerance)?";
+  return "high: is a simpler body near enough (fit or simplify with another --tolerance)?";
 }
 
 }  // namespace nurbs

@@ -196,8 +196,9 @@ void fit_mesh(const FitArguments& a, const TriangleMesh& raw) {
   write_whole(a.output, write_shape(content));
   size_t points = 0;
   for (const NurbsSurface& s : content.surfaces) points += s.points.size();
-  std::printf("%s: %s; %zu patches, %zu control points in the file\n", a.output.c_str(), best.kind.c_str(),
-              content.surfaces.size(), points);
+  std::printf(
+      "%s: %s; %zu patches, %zu control points in the file, where patches repeat the edges they share\n",
+      a.output.c_str(), best.kind.c_str(), content.surfaces.size(), points);
   std::printf("distance from the hull: %.3g %% outward, %.3g %% inward of its radius %.6g (bounds)\n",
               100 * best.distance.outward / best.radius, 100 * best.distance.inward / best.radius,
               best.radius);
@@ -208,6 +209,8 @@ void fit_mesh(const FitArguments& a, const TriangleMesh& raw) {
   }
   std::printf("joints smooth to %.2g degrees; curvature radius %.4g to %.4g\n", worst_kink(*shape),
               shape->patch_curvature.min_radius, shape->patch_curvature.max_radius);
+  if (!(shape->patch_curvature.min_radius > 0))
+    std::printf("no least curvature radius is proven, which makes contacts dear: try another tolerance\n");
   print_differences("the hull", mass, hull->properties(), best.radius);
   print_differences("the mesh", mass, own, best.radius);
 }

@@ -325,6 +325,19 @@ class Fit(unittest.TestCase):
                 bounds = re.search(r"distance from the hull: (\S+) % outward, (\S+) % inward", said).groups()
                 self.assertLess(max(map(float, bounds)), 5)
 
+    def test_more_room_takes_no_more_points(self):
+        """Asked for no more than they may miss, small bodies miss it: a larger tolerance once took four times as many."""
+        points, faces = meshes.icosphere(0)
+        points = points * np.random.default_rng(14).uniform(0.8, 1.2, size=(len(points), 1)) * (1.5, 1, 1)
+        counts = []
+        for tolerance in ("10%", "8%", "6%"):
+            said = self.fit(points, faces, "--tolerance", tolerance)
+            counts.append(int(re.search(r"(\d+) control points in the file", said)[1]))
+            self.assertIn("strictly convex", call("info", self.out).stdout)
+        self.assertEqual(counts, sorted(counts))
+        self.assertLessEqual(counts[0], 216)
+        self.assertLessEqual(counts[-1], 384)
+
     def test_many_faces_at_last(self):
         """Half a cylinder is neither of revolution nor of a few faces: a polyhedron, as nothing else is near enough."""
         points, faces = meshes.prism(128)
