@@ -3,6 +3,7 @@
 
 #include <Eigen/QR>
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <numeric>
@@ -316,32 +317,65 @@ void inherit(const CellBounds& whole, CellBounds* half) {
   half->speed_v = std::max(half->speed_v, whole.speed_v);
 }
 
-// Halves of a leaf the better way: where little is known yet both ways are tried, since a needle's cells are
+using Halves = std::pair<Leaf, Leaf>;
+constexpr int kSplitAtOnce = 16;  // leaves whose halves are enclosed side by side
+
+// A leaf to be halved, of which patch; `ball` may be null.
+struct Splitting {
+  const BezierPatch* patch;
+  const Leaf* leaf;
+  Wanted wanted;
+  const Ball* ball;
+  bool in_u;
+  Halves* to;
+};
+
+void halve_all(const std::vector<Splitting>& all, int* cells) {
+  std::vector<Enclosed> halves;
+  halves.reserve(2 * all.size());
+  for (const Splitting& s : all) {
+    halve(*s.patch, s.leaf->cell, s.in_u, &s.to->first.cell, &s.to->second.cell);
+    for (Leaf* half : {&s.to->first, &s.to->second}) halves.push_back({s.patch, &half->cell, s.wanted, {}});
+  }
+  enclose(halves.data(), static_cast<int>(halves.size()));
+  *cells += static_cast<int>(halves.size());
+  const Enclosed* next = halves.data();
+  for (const Splitting& s : all)
+    for (Leaf* half : {&s.to->first, &s.to->second}) {
+      half->bounds = (next++)->bounds;
+      inherit(s.leaf->bounds, &half->bounds);
+      if (s.ball) on_ball(*s.ball, *s.patch, half);
+    }
+}
+
+// Halves of leaves the better way: where little is known yet both ways are tried, since a needle's cells are
 // a thousand times longer than wide. A way is as good as the better half: the other one may hold what makes
 // the doubt. Where neither helps the cell is a strip that bends more than it is wide, and is cut across.
-std::pair<Leaf, Leaf> split(const BezierPatch& patch, const Leaf& leaf, Wanted wanted, const Ball& ball,
-                            int* cells) {
-  const auto halves = [&](bool in_u) {
-    std::pair<Leaf, Leaf> pair;
-    halve(patch, leaf.cell, in_u, &pair.first.cell, &pair.second.cell);
-    for (Leaf* half : {&pair.first, &pair.second}) {
-      ++*cells;
-      half->bounds = enclose(patch, half->cell, wanted);
-      inherit(leaf.bounds, &half->bounds);
-      on_ball(ball, patch, half);
-    }
-    return pair;
-  };
-  const bool in_u = leaf.bounds.split_u;
-  std::pair<Leaf, Leaf> best = halves(in_u);
-  if ((leaf.bounds.convex || leaf.bounds.doubt < kLittleDoubt) && leaf.bounds.cone < kWideCone) return best;
-  std::pair<Leaf, Leaf> other = halves(!in_u);
-  const auto doubt = [](const std::pair<Leaf, Leaf>& p) {
-    return std::min(p.first.bounds.doubt, p.second.bounds.doubt);
-  };
-  const bool neither = std::min(doubt(best), doubt(other)) >= leaf.bounds.doubt;
-  const bool turn = neither ? (leaf.cell.du >= leaf.cell.dv) != in_u : doubt(other) < doubt(best);
-  return turn ? other : best;
+// `all` has the likely way; results in its `to`.
+void split_all(const std::vector<Splitting>& all, int* cells) {
+  halve_all(all, cells);
+  std::vector<Splitting> doubtful;
+  for (const Splitting& s : all) {
+    const CellBounds& b = s.leaf->bounds;
+    if (!((b.convex || b.doubt < kLittleDoubt) && b.cone < kWideCone)) doubtful.push_back(s);
+  }
+  if (doubtful.empty()) return;
+  std::vector<Halves> others(doubtful.size());
+  for (size_t k = 0; k < doubtful.size(); ++k) {
+    doubtful[k].in_u = !doubtful[k].in_u;
+    doubtful[k].to = &others[k];
+  }
+  halve_all(doubtful, cells);
+  const auto doubt = [](const Halves& p) { return std::min(p.first.bounds.doubt, p.second.bounds.doubt); };
+  size_t next = 0;
+  for (const Splitting& s : all) {
+    if (next == doubtful.size() || doubtful[next].leaf != s.leaf) continue;
+    Halves& other = others[next++];
+    const Leaf& leaf = *s.leaf;
+    const bool neither = std::min(doubt(*s.to), doubt(other)) >= leaf.bounds.doubt;
+    const bool turn = neither ? (leaf.cell.du >= leaf.cell.dv) != s.in_u : doubt(other) < doubt(*s.to);
+    if (turn) std::swap(*s.to, other);
+  }
 }
 
 // u = r s / (1 + (r - 1) s), s the parameter of the even patch.
@@ -448,13 +482,21 @@ class Bounder {
   // Radii come first, without rates, which cost as much again.
   void begin_rates() {
     with_rates_ = true;
+    std::vector<Enclosed> cells;
+    std::vector<Leaf*> leaves;
     for (Open& o : open_) {
-      if (!o.leaf.bounds.convex || !wants_rate(o.leaf.cell)) continue;
-      CellBounds rated = enclose(out_.even[o.leaf.cell.patch], o.leaf.cell, {true, wanted_.stretch});
-      inherit(o.leaf.bounds, &rated);
-      o.leaf.bounds = rated;
-      on_ball(balls_[o.leaf.cell.patch], out_.even[o.leaf.cell.patch], &o.leaf);
-      see_rate(o.leaf);
+      const Cell& c = o.leaf.cell;
+      if (!o.leaf.bounds.convex || !wants_rate(c)) continue;
+      cells.push_back({&out_.even[c.patch], &c, {true, wanted_.stretch}, {}});
+      leaves.push_back(&o.leaf);
+    }
+    enclose(cells.data(), static_cast<int>(cells.size()));
+    for (size_t k = 0; k < leaves.size(); ++k) {
+      Leaf& leaf = *leaves[k];
+      inherit(leaf.bounds, &cells[k].bounds);
+      leaf.bounds = cells[k].bounds;
+      on_ball(balls_[leaf.cell.patch], *cells[k].patch, &leaf);
+      see_rate(leaf);
     }
   }
   void see_rate(const Leaf& leaf) {
@@ -478,18 +520,30 @@ class Bounder {
     std::iota(level.begin(), level.end(), 0);
     while (!level.empty() && out_.cells < most_cells) {
       next.clear();
-      for (const int i : level) {
-        Open& o = open_[i];
-        if (out_.cells >= most_cells || o.depth >= kDeepestCell || !loose(o)) continue;
-        const int depth = o.depth + 1;
-        const int p = o.leaf.cell.patch;
-        auto [a, b] = split(out_.even[p], o.leaf, wanted(o.leaf.cell), balls_[p], &out_.cells);
-        see(a);
-        see(b);
-        o = {std::move(a), depth};
-        next.push_back(i);
-        next.push_back(static_cast<int>(open_.size()));
-        open_.push_back({std::move(b), depth});
+      for (size_t at = 0; at < level.size();) {
+        splittings_.clear();
+        chosen_.clear();
+        for (; at < level.size() && static_cast<int>(chosen_.size()) < kSplitAtOnce; ++at) {
+          const Open& o = open_[level[at]];
+          const int spent = out_.cells + 2 * static_cast<int>(chosen_.size());
+          if (spent >= most_cells || o.depth >= kDeepestCell || !loose(o)) continue;
+          const Cell& c = o.leaf.cell;
+          splittings_.push_back({&out_.even[c.patch], &o.leaf, wanted(c), &balls_[c.patch],
+                                 o.leaf.bounds.split_u, &halves_[chosen_.size()]});
+          chosen_.push_back(level[at]);
+        }
+        split_all(splittings_, &out_.cells);
+        for (size_t k = 0; k < chosen_.size(); ++k) {
+          auto& [a, b] = halves_[k];
+          see(a);
+          see(b);
+          Open& o = open_[chosen_[k]];
+          o = {std::move(a), o.depth + 1};
+          next.push_back(chosen_[k]);
+          next.push_back(static_cast<int>(open_.size()));
+          const int depth = o.depth;
+          open_.push_back({std::move(b), depth});
+        }
       }
       level.swap(next);
     }
@@ -581,6 +635,9 @@ class Bounder {
   bool with_rates_ = false, sphere_ = false, hollow_ = false;
   std::vector<std::pair<Change, Change>> changes_;
   std::vector<Open> open_;
+  std::vector<Splitting> splittings_;  // of halve_while
+  std::vector<int> chosen_;
+  std::array<Halves, kSplitAtOnce> halves_;
   std::vector<double> seen_rate_;
   std::vector<Ball> balls_;
   SurfaceBounds out_;
@@ -615,18 +672,32 @@ namespace {
 template <class Loose>
 void refine(const Loose& loose, int cells, Wanted wanted, int* spent, SurfaceBounds* bounds) {
   std::vector<Leaf>& leaves = bounds->leaves;
-  std::vector<int> level(leaves.size()), next;
+  std::vector<int> level(leaves.size()), next, chosen;
   std::iota(level.begin(), level.end(), 0);
+  std::vector<Splitting> splittings;
+  std::vector<Halves> halves(kSplitAtOnce);
   while (!level.empty()) {
     next.clear();
-    for (const int i : level) {
-      Leaf& leaf = leaves[i];
-      if (*spent >= cells || !loose(leaf.bounds) || leaf.cell.du * leaf.cell.dv < kLeastNormalCell) continue;
-      auto [a, b] = split(bounds->even[leaf.cell.patch], leaf, wanted, {}, spent);
-      leaf = std::move(a);
-      next.push_back(i);
-      next.push_back(static_cast<int>(leaves.size()));
-      leaves.push_back(std::move(b));
+    for (size_t at = 0; at < level.size();) {
+      splittings.clear();
+      chosen.clear();
+      for (; at < level.size() && static_cast<int>(chosen.size()) < kSplitAtOnce; ++at) {
+        const Leaf& leaf = leaves[level[at]];
+        const Cell& c = leaf.cell;
+        if (*spent + 2 * static_cast<int>(chosen.size()) >= cells || !loose(leaf.bounds) ||
+            c.du * c.dv < kLeastNormalCell)
+          continue;
+        splittings.push_back(
+            {&bounds->even[c.patch], &leaf, wanted, nullptr, leaf.bounds.split_u, &halves[chosen.size()]});
+        chosen.push_back(level[at]);
+      }
+      split_all(splittings, spent);
+      for (size_t k = 0; k < chosen.size(); ++k) {
+        leaves[chosen[k]] = std::move(halves[k].first);
+        next.push_back(chosen[k]);
+        next.push_back(static_cast<int>(leaves.size()));
+        leaves.push_back(std::move(halves[k].second));
+      }
     }
     level.swap(next);
   }
