@@ -5,7 +5,6 @@
 #include <limits>
 
 #include "body/affine_form.h"
-#include "nurbs/bernstein.h"
 #include "nurbs/tolerances.h"
 
 namespace nurbs {
@@ -240,10 +239,11 @@ Real rate_at(const Middle<Real>& j) {
   return most;
 }
 
-// Coefficient (i, j) of a net of degrees p, q, turned so that the pole is at u = 0 (a rotation of the
+// Coefficient (i, j) of a patch, turned so that the pole is at u = 0 (a rotation of the
 // parameters: normals stay outward).
-const Vec4& turned_point(const Vec4* net, int p, int q, int pole, int i, int j) {
-  const auto at = [&](int iu, int jv) -> const Vec4& { return net[iu * (q + 1) + jv]; };
+const Vec4& turned_point(const BezierPatch& patch, int pole, int i, int j) {
+  const int p = patch.degree_u, q = patch.degree_v;
+  const auto at = [&](int iu, int jv) -> const Vec4& { return patch.point(iu, jv); };
   switch (pole) {
     case 1:
       return at(p - i, q - j);
@@ -435,36 +435,8 @@ Real largest_cubic(const Real& c0, const Real& c1, const Real& c2, const Real& c
 
 }  // namespace
 
-Cell whole_patch(const std::vector<BezierPatch>& patches, int patch) {
-  Cell cell;
-  cell.patch = patch;
-  cell.net.assign(patches[patch].points);
-  return cell;
-}
-
-void set_pole(const BezierPatch& patch, int edge, Cell* cell) {
-  cell->pole = edge;
-  const int p = patch.degree_u, q = patch.degree_v, n = edge < 2 ? p : q;
-  const Vec4& corner = cell->net[edge % 2 ? cell->net.size() - 1 : 0];
-  const Vec3 pole = corner.head<3>() / corner[3];
-  cell->z.clear();
-  for (int i = 0; i <= p; ++i)
-    for (int j = 0; j <= q; ++j) {
-      const int k = edge < 2 ? i : j, away = edge % 2 ? n - k : k;  // from the pole
-      if (away == 0) continue;
-      const Vec4& c = cell->net[i * (q + 1) + j];
-      Vec4 z = Vec4::Zero();
-      z.head<3>() = static_cast<double>(n) / away * (c.head<3>() - c[3] * pole);
-      cell->z.push_back(z);
-    }
-}
-
-void halve(const BezierPatch& patch, const Cell& cell, bool in_u, Cell* first, Cell* second) {
+void halve(const Cell& cell, bool in_u, Cell* first, Cell* second) {
   *first = *second = cell;
-  const int p = patch.degree_u, q = patch.degree_v;
-  halve_net(first->net.data(), second->net.data(), p, q, in_u);
-  if (cell.pole >= 0)
-    halve_net(first->z.data(), second->z.data(), cell.pole < 2 ? p - 1 : p, cell.pole < 2 ? q : q - 1, in_u);
   if (in_u) {
     first->du = second->du = 0.5 * cell.du;
     second->u0 += 0.5 * cell.du;
@@ -529,37 +501,79 @@ bool prepare(const BezierPatch& patch, const Cell& cell, Wanted wanted, bool upr
   return true;
 }
 
-// The net of a cell in its frame's coordinates; of z, one degree less, where there is a pole. With the
-// round-off of its coefficients.
-template <class Real>
-void take_net(const Framed& f, int lane, Net<Real>* net, Net<Real>* weight, Point<Real>* noise) {
-  const auto [rows, columns, polar, touches, rational, rate, stretch] = f.kind;
-  const int p = f.patch->degree_u, q = f.patch->degree_v;
-  const int zp = f.turned || !polar ? p : p - 1, zq = f.turned ? q - 1 : q;
-  const Mat3& to = f.frame.to;
-  double largest = 0, heaviest = 0;
-  net->m = polar ? rows - 1 : rows;
-  net->n = weight->n = columns;
-  weight->m = rows;
-  const auto set = [&](int i, int j, const Vec3& x) {
-    for (int k = 0; k < 3; ++k) put(x[k], lane, &net->at(i, j).at[k]);
-  };
-  for (int i = 0; i <= rows; ++i)
-    for (int j = 0; j <= columns; ++j) {
-      const Vec4& c = turned_point(f.cell->net.data(), p, q, f.cell->pole, i, j);
-      largest = std::max(largest, c.head<3>().lpNorm<Eigen::Infinity>());
-      heaviest = std::max(heaviest, c[3]);
-      put(c[3], lane, &(polar ? weight : net)->at(i, j).at[3]);
-      if (!polar)
-        set(i, j, to * (c.head<3>() - c[3] * f.middle));
-      else if (i < rows)
-        set(i, j, to * turned_point(f.cell->z.data(), zp, zq, f.cell->pole, i, j).head<3>());
-    }
-  const double size = largest + heaviest * f.middle.lpNorm<Eigen::Infinity>();
-  const Vec3 off = kNetRoundoff * (polar ? rows : 1) * (to.cwiseAbs() * Vec3::Constant(size));
-  for (int k = 0; k < 3; ++k) put(off[k], lane, &noise->at[k]);
-  put(rational ? kNetRoundoff * heaviest : 0, lane, &noise->at[3]);
+// Parameters from `low` to `high` of a patch turned as its pole wants it.
+struct Section {
+  double low, high;
+};
+Section rows_of(const Cell& c) {
+  const double u1 = c.u0 + c.du, v1 = c.v0 + c.dv;
+  switch (c.pole) {
+    case 1:
+      return {1 - u1, 1 - c.u0};
+    case 2:
+      return {c.v0, v1};
+    case 3:
+      return {1 - v1, 1 - c.v0};
+    default:
+      return {c.u0, u1};
+  }
 }
+Section columns_of(const Cell& c) {
+  const double u1 = c.u0 + c.du, v1 = c.v0 + c.dv;
+  switch (c.pole) {
+    case 1:
+      return {1 - v1, 1 - c.v0};
+    case 2:
+      return {1 - u1, 1 - c.u0};
+    case 3:
+      return {c.u0, u1};
+    default:
+      return {c.v0, v1};
+  }
+}
+
+// De Casteljau at `high`, then what is left at `low`, of coefficients `stride` apart.
+template <class Real>
+void restrict_row(const Real& high, const Real& low_share, int degree, int stride, int k, Point<Real>* c) {
+  const Real below = 1.0 - high, above = 1.0 - low_share;
+  for (int step = 1; step <= degree; ++step)
+    for (int i = degree; i >= step; --i)
+      c[i * stride].at[k] = below * c[(i - 1) * stride].at[k] + high * c[i * stride].at[k];
+  for (int step = 1; step <= degree; ++step)
+    for (int i = 0; i <= degree - step; ++i)
+      c[i * stride].at[k] = above * c[i * stride].at[k] + low_share * c[(i + 1) * stride].at[k];
+}
+
+// Where the cells are in their patches: each parameter's upper end, and the lower one's share of it.
+template <class Real>
+struct Sections {
+  Real high_u, low_u, high_v, low_v;
+};
+template <class Real>
+void restrict_net(const Sections<Real>& to, Coordinates which, Net<Real>* net) {
+  const int row = net->n + 1;
+  for (int k = which.first; k < which.end; ++k) {
+    for (int j = 0; j < row; ++j) restrict_row(to.high_u, to.low_u, net->m, row, k, net->c + j);
+    for (int i = 0; i <= net->m; ++i) restrict_row(to.high_v, to.low_v, net->n, 1, k, net->c + i * row);
+  }
+}
+
+}  // namespace
+
+std::vector<Vec4> net_of(const BezierPatch& patch, const Cell& cell) {
+  Net<double> net;
+  net.m = patch.degree_u;
+  net.n = patch.degree_v;
+  for (size_t i = 0; i < patch.points.size(); ++i)
+    for (int k = 0; k < 4; ++k) net.c[i].at[k] = patch.points[i][k];
+  const double u1 = cell.u0 + cell.du, v1 = cell.v0 + cell.dv;
+  restrict_net<double>({u1, cell.u0 / u1, v1, cell.v0 / v1}, {0, 4}, &net);
+  std::vector<Vec4> points;
+  for (size_t i = 0; i < patch.points.size(); ++i) points.emplace_back(net.c[i].at);
+  return points;
+}
+
+namespace {
 
 template <class Real>
 void take_middle(const Framed& f, int lane, Middle<Real>* to) {
@@ -605,13 +619,97 @@ class Enclosing {
   void take() {
     for (int l = 0; l < kLanes<Real>; ++l) {
       const Framed& f = *cells_[std::min(l, count_ - 1)];
-      take_net(f, l, &net_, &weight_, &noise_);
       put(f.frame.back, l, &frame_back_);
       put(f.frame.to, l, &frame_to_);
       put(f.frame.det, l, &frame_det_);
+      put(f.middle, l, &middle_);
       put(f.start, l, &start_);
       put(f.length, l, &length_);
+      const Section rows = rows_of(*f.cell), columns = columns_of(*f.cell);
+      put(rows.high, l, &sections_.high_u);
+      put(rows.low / rows.high, l, &sections_.low_u);
+      put(columns.high, l, &sections_.high_v);
+      put(columns.low / columns.high, l, &sections_.low_v);
     }
+    take_patches();
+    take_nets();
+  }
+
+  // Whole nets, turned as the pole wants it.
+  void take_patches() {
+    net_.m = kind_.rows;
+    net_.n = kind_.columns;
+    bool one = true;
+    for (int l = 1; l < count_; ++l)
+      one &= cells_[l]->patch == cells_[0]->patch && cells_[l]->cell->pole == cells_[0]->cell->pole;
+    for (int i = 0; i <= net_.m; ++i)
+      for (int j = 0; j <= net_.n; ++j) {
+        Point<Real>& to = net_.at(i, j);
+        for (int l = 0; l < (one ? 1 : kLanes<Real>); ++l) {
+          const Framed& f = *cells_[std::min(l, count_ - 1)];
+          const Vec4& c = turned_point(*f.patch, f.cell->pole, i, j);
+          for (int k = 0; k < 4; ++k)
+            if (one)
+              to.at[k] = all<Real>(c[k]);
+            else
+              put(c[k], l, &to.at[k]);
+        }
+      }
+  }
+
+  // The cells' nets in their frames' coordinates; of z, one degree less, where there is a pole. With the
+  // round-off of the coefficients.
+  void take_nets() {
+    const Coordinates which{0, kind_.rational ? 4 : 3};
+    if (kind_.polar) take_quotient();
+    restrict_net(sections_, which, &net_);
+    Real largest{}, heaviest = all<Real>(1);
+    const int count = (net_.m + 1) * (net_.n + 1);
+    for (int i = 0; i < count; ++i) {
+      const Point<Real>& c = net_.c[i];
+      for (int k = 0; k < 3; ++k) largest = larger(magnitude(c.at[k]), largest);
+      if (kind_.rational) heaviest = i == 0 ? c.at[3] : larger(c.at[3], heaviest);
+    }
+    if (kind_.polar) {
+      weight_ = net_;
+      net_ = quotient_;
+      restrict_net(sections_, {0, 3}, &net_);
+      for (int i = 0; i < (net_.m + 1) * (net_.n + 1); ++i)
+        turn_to_frame(Triple<Real>{Real{}, Real{}, Real{}}, &net_.c[i]);
+    } else {
+      for (int i = 0; i < count; ++i) {
+        const Real w = kind_.rational ? net_.c[i].at[3] : all<Real>(1);
+        turn_to_frame(w * middle_, &net_.c[i]);
+      }
+    }
+    const Real farthest = larger(magnitude(middle_.x), larger(magnitude(middle_.y), magnitude(middle_.z)));
+    const Real size = (kNetRoundoff * (kind_.polar ? kind_.rows : 1)) * (largest + heaviest * farthest);
+    for (int k = 0; k < 3; ++k) {
+      const Triple<Real>& row = frame_to_.row[k];
+      noise_.at[k] = size * (magnitude(row.x) + magnitude(row.y) + magnitude(row.z));
+    }
+    noise_.at[3] = kNetRoundoff * heaviest;
+  }
+
+  void turn_to_frame(const Triple<Real>& origin, Point<Real>* c) const {
+    const Triple<Real> y =
+        frame_to_ * Triple<Real>{c->at[0] - origin.x, c->at[1] - origin.y, c->at[2] - origin.z};
+    c->at[0] = y.x;
+    c->at[1] = y.y;
+    c->at[2] = y.z;
+  }
+
+  // z w, of the whole patch.
+  void take_quotient() {
+    quotient_.m = net_.m - 1;
+    quotient_.n = net_.n;
+    const Point<Real>& corner = net_.at(0, 0);
+    for (int i = 1; i <= net_.m; ++i)
+      for (int j = 0; j <= net_.n; ++j)
+        for (int k = 0; k < 3; ++k)
+          quotient_.at(i - 1, j).at[k] =
+              (static_cast<double>(net_.m) / i) *
+              (net_.at(i, j).at[k] - net_.at(i, j).at[3] * (corner.at[k] / corner.at[3]));
   }
 
   // Position and derivatives; the basis of the tangent plane, the normal N and the form D in that basis,
@@ -811,7 +909,9 @@ class Enclosing {
   const Framed* const* cells_;
   const int count_;
   const Kind kind_;
-  Net<Real> net_, weight_;
+  Triple<Real> middle_;
+  Sections<Real> sections_;
+  Net<Real> net_, weight_, quotient_;
   Point<Real> noise_;
   Turn<Real> frame_back_, frame_to_, back_;
   Real frame_det_, start_, length_;

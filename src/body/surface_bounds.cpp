@@ -40,10 +40,9 @@ bool smooth_pole(const EdgeLink& link, double size) {
 
 // Strips at poles first, so that cells lie in one or outside. Of a patch with a pole at either end each half
 // has its own; one with poles at neighbouring edges has none that serves.
-std::vector<Cell> first_cells(const Shape& shape, const std::vector<BezierPatch>& even, int patch) {
+std::vector<Cell> first_cells(const Shape& shape, int patch) {
   const auto& links = shape.links[patch];
-  const BezierPatch& surface = even[patch];
-  const Cell whole = whole_patch(even, patch);
+  const Cell whole{patch};
   const auto smooth = [&](int edge) { return smooth_pole(links[edge], shape.bounding_radius); };
   std::vector<Cell> cells;
   for (const int low : {0, 2}) {
@@ -54,13 +53,13 @@ std::vector<Cell> first_cells(const Shape& shape, const std::vector<BezierPatch>
       const int pole = smooth(edge)                                           ? edge
                        : !links[edge].collapsed && smooth(low + 1 - edge % 2) ? low + 1 - edge % 2
                                                                               : -1;
-      if (pole >= 0) set_pole(surface, pole, &c);
+      if (pole >= 0) c.pole = pole;
       Cell first, second;
-      halve(surface, c, edge < 2, &first, &second);
+      halve(c, edge < 2, &first, &second);
       c = edge % 2 ? std::move(second) : std::move(first);
       while (links[edge].collapsed && (edge < 2 ? c.du : c.dv) > kPoleStrip) {
         Cell lower, upper;
-        halve(surface, c, edge < 2, &lower, &upper);
+        halve(c, edge < 2, &lower, &upper);
         if (edge % 2) std::swap(lower, upper);
         cells.push_back(std::move(upper));
         c = std::move(lower);
@@ -245,12 +244,13 @@ void on_ball(const Ball& ball, const BezierPatch& patch, Leaf* leaf) {
   const int p = patch.degree_u, q = patch.degree_v;
   if (!out.regular) {
     Form<Vec3> x(p, q, Vec3::Zero()), u(p - 1, q, Vec3::Zero()), v(p, q - 1, Vec3::Zero());
+    const std::vector<Vec4> net = net_of(patch, leaf->cell);
     double heaviest = 0, lightest = kInfinity, weight_u = 0, weight_v = 0, speed_u = 0, speed_v = 0;
     Vec3 axis = Vec3::Zero();
-    const auto weight = [&](int i, int j) { return leaf->cell.net[i * (q + 1) + j][3]; };
+    const auto weight = [&](int i, int j) { return net[i * (q + 1) + j][3]; };
     for (int i = 0; i <= p; ++i)
       for (int j = 0; j <= q; ++j) {
-        const Vec4& c = leaf->cell.net[i * (q + 1) + j];
+        const Vec4& c = net[i * (q + 1) + j];
         x(i, j) = c.head<3>() - c[3] * ball.center;
         axis += x(i, j);
         heaviest = std::max(heaviest, c[3]);
@@ -334,7 +334,7 @@ void halve_all(const std::vector<Splitting>& all, int* cells) {
   std::vector<Enclosed> halves;
   halves.reserve(2 * all.size());
   for (const Splitting& s : all) {
-    halve(*s.patch, s.leaf->cell, s.in_u, &s.to->first.cell, &s.to->second.cell);
+    halve(s.leaf->cell, s.in_u, &s.to->first.cell, &s.to->second.cell);
     for (Leaf* half : {&s.to->first, &s.to->second}) halves.push_back({s.patch, &half->cell, s.wanted, {}});
   }
   enclose(halves.data(), static_cast<int>(halves.size()));
@@ -424,7 +424,7 @@ class Bounder {
     share_balls();
     for (int p = 0; p < patches_; ++p) {
       if (const auto plane = plane_bounds(out_.even[p], shape_.bounding_radius)) {
-        open_.push_back({{whole_patch(out_.even, p), *plane, {}}, kDeepestCell});  // nothing is left to find
+        open_.push_back({{Cell{p}, *plane, {}}, kDeepestCell});  // nothing is left to find
         ++out_.cells;
         continue;
       }
@@ -432,7 +432,7 @@ class Bounder {
       const double known = rounding(shape_.patches[p]);
       // Planes, whose radius is infinite, are looked at all the same.
       const double round = std::max(known < kFarAway ? known : 0, balls_[p].radius * (1 - balls_[p].bent));
-      for (Cell& c : first_cells(shape_, out_.even, p)) {
+      for (Cell& c : first_cells(shape_, p)) {
         Leaf leaf{std::move(c), {}, {}};
         leaf.bounds = enclose(out_.even[p], leaf.cell, wanted(leaf.cell));
         on_ball(balls_[p], out_.even[p], &leaf);

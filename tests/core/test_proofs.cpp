@@ -104,12 +104,12 @@ TEST(Enclosure, holds_at_every_point_of_every_cell) {
   for (const ShapePointer& shape : shapes)
     for (int trial = 0; trial < 60; ++trial) {
       const int patch = random.below(static_cast<int>(shape->patches.size()));
-      Cell cell = whole_patch(shape->patches, patch);
+      Cell cell{patch};
       for (int edge = 0; edge < 4; ++edge)
-        if (shape->links[patch][edge].collapsed) set_pole(shape->patches[patch], edge, &cell);
+        if (shape->links[patch][edge].collapsed) cell.pole = edge;
       for (int depth = random.whole(4, 14); depth > 0; --depth) {
         Cell a, b;
-        halve(shape->patches[patch], cell, random.below(2), &a, &b);
+        halve(cell, random.below(2), &a, &b);
         cell = random.below(2) ? a : b;
       }
       expect_encloses(*shape, patch, cell, random);
@@ -161,14 +161,14 @@ TEST(Enclosure, turned_polar_cells_are_the_same) {
       const size_t p = &patch - shape->patches.data();
       for (int edge = 0; edge < 4; ++edge) {
         if (!shape->links[p][edge].collapsed) continue;
-        Cell cell = whole_patch(shape->patches, static_cast<int>(p));
-        set_pole(patch, edge, &cell);
+        Cell cell{static_cast<int>(p)};
+        cell.pole = edge;
         for (int k = 0; k < 4; ++k) {
           Cell across, beyond;
-          halve(patch, cell, edge < 2, &across, &beyond);
+          halve(cell, edge < 2, &across, &beyond);
           cell = edge % 2 ? beyond : across;
           Cell first, second;
-          halve(patch, cell, edge >= 2, &first, &second);
+          halve(cell, edge >= 2, &first, &second);
           cell = k % 2 ? first : second;
         }
         const CellBounds b = enclose(patch, cell, {});
@@ -336,10 +336,10 @@ TEST(Spikes, are_in_every_enclosure_and_not_in_samples) {
   EXPECT_TRUE(finite > 0 || s.proofs.rate == 0) << "no rate is promised near the rim, or it holds";
   for (int trial = 0; trial < 200; ++trial) {
     const int patch = random.below(static_cast<int>(s.patches.size()));
-    Cell cell = whole_patch(s.patches, patch);
+    Cell cell{patch};
     for (int depth = random.whole(4, 24); depth > 0; --depth) {
       Cell low, high;
-      halve(s.patches[patch], cell, depth % 3 == 0 && random.below(2), &low, &high);
+      halve(cell, depth % 3 == 0 && random.below(2), &low, &high);
       cell = random.below(6) ? low : high;  // towards the rim
     }
     expect_encloses(s, patch, cell, random);
