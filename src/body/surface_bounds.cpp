@@ -29,11 +29,6 @@ constexpr double kSurelyTurned = 1e-6;  // least over largest coefficient of a v
 constexpr double kMostBent = 0.1;  // of a curvature: a patch on a ball in which it is known worse is a sliver
 constexpr double kBent = 1e-3;     // over the bounding radius: a curvature worth it
 
-struct Open {
-  Leaf leaf;
-  int depth = 0;
-};
-
 bool smooth_pole(const EdgeLink& link, double size) {
   return link.collapsed && link.kink_bound <= kNoKink && link.gap <= kJointRoundoff * size;
 }
@@ -424,7 +419,7 @@ class Bounder {
     share_balls();
     for (int p = 0; p < patches_; ++p) {
       if (const auto plane = plane_bounds(out_.even[p], shape_.bounding_radius)) {
-        open_.push_back({{Cell{p}, *plane, {}}, kDeepestCell});  // nothing is left to find
+        out_.leaves.push_back({Cell{p}, *plane, {}, kDeepestCell});  // nothing is left to find
         ++out_.cells;
         continue;
       }
@@ -433,34 +428,36 @@ class Bounder {
       // Planes, whose radius is infinite, are looked at all the same.
       const double round = std::max(known < kFarAway ? known : 0, balls_[p].radius * (1 - balls_[p].bent));
       for (Cell& c : first_cells(shape_, p)) {
-        Leaf leaf{std::move(c), {}, {}};
+        Leaf leaf;
+        leaf.cell = c;
         leaf.bounds = enclose(out_.even[p], leaf.cell, wanted(leaf.cell));
         on_ball(balls_[p], out_.even[p], &leaf);
         leaf.bounds.min_radius = std::max(leaf.bounds.min_radius, round);
         if (bulging) leaf.bounds.least_curvature = std::max(leaf.bounds.least_curvature, 0.0);
         ++out_.cells;
         see(leaf);
-        open_.push_back({std::move(leaf), 0});
+        out_.leaves.push_back(leaf);
       }
     }
     const int most = kMostCells + kMostCellsPerPatch * patches_;
-    if (!sphere_) halve_while([this](const Open& o) { return least_loose(o); }, kLeastRadiusBudget * most);
+    if (!sphere_)
+      halve_while([this](const Leaf& leaf) { return least_loose(leaf); }, kLeastRadiusBudget * most);
     const int base = std::max(most, out_.cells + most / 2);
-    halve_while([this](const Open& o) { return o.depth < kDeepestUnproven && unproven(o); }, base);
-    halve_while([this](const Open& o) { return !hollow_ && unproven(o) && bent(o); }, kConvexBudget * most);
-    halve_while([this](const Open& o) { return radii_loose(o); }, std::max(most, out_.cells + most / 2));
+    halve_while([this](const Leaf& leaf) { return leaf.depth < kDeepestUnproven && unproven(leaf); }, base);
+    halve_while([this](const Leaf& leaf) { return !hollow_ && unproven(leaf) && bent(leaf); },
+                kConvexBudget * most);
+    halve_while([this](const Leaf& leaf) { return radii_loose(leaf); },
+                std::max(most, out_.cells + most / 2));
     if (!wanted_.rate) return leave();
     begin_rates();
     const int enough = out_.cells + kMostRateCells + kMostCellsPerPatch * patches_;
-    halve_while([this](const Open& o) { return unrated(o) && rate_loose(o); }, enough);
-    halve_while([this](const Open& o) { return rate_loose(o); }, enough);
+    halve_while([this](const Leaf& leaf) { return unrated(leaf) && rate_loose(leaf); }, enough);
+    halve_while([this](const Leaf& leaf) { return rate_loose(leaf); }, enough);
     return leave();
   }
 
  private:
   SurfaceBounds leave() {
-    out_.leaves.reserve(open_.size());
-    for (Open& o : open_) out_.leaves.push_back(std::move(o.leaf));
     finish();
     return std::move(out_);
   }
@@ -484,11 +481,11 @@ class Bounder {
     with_rates_ = true;
     std::vector<Enclosed> cells;
     std::vector<Leaf*> leaves;
-    for (Open& o : open_) {
-      const Cell& c = o.leaf.cell;
-      if (!o.leaf.bounds.convex || !wants_rate(c)) continue;
+    for (Leaf& leaf : out_.leaves) {
+      const Cell& c = leaf.cell;
+      if (!leaf.bounds.convex || !wants_rate(c)) continue;
       cells.push_back({&out_.even[c.patch], &c, {true, wanted_.stretch}, {}});
-      leaves.push_back(&o.leaf);
+      leaves.push_back(&leaf);
     }
     enclose(cells.data(), static_cast<int>(cells.size()));
     for (size_t k = 0; k < leaves.size(); ++k) {
@@ -516,7 +513,7 @@ class Bounder {
   // What is not loose stays so, as what is seen can only move the aims outward: leaves are looked at once.
   template <class Loose>
   void halve_while(const Loose& loose, int most_cells) {
-    std::vector<int> level(open_.size()), next;
+    std::vector<int> level(out_.leaves.size()), next;
     std::iota(level.begin(), level.end(), 0);
     while (!level.empty() && out_.cells < most_cells) {
       next.clear();
@@ -524,12 +521,12 @@ class Bounder {
         splittings_.clear();
         chosen_.clear();
         for (; at < level.size() && static_cast<int>(chosen_.size()) < kSplitAtOnce; ++at) {
-          const Open& o = open_[level[at]];
+          const Leaf& leaf = out_.leaves[level[at]];
           const int spent = out_.cells + 2 * static_cast<int>(chosen_.size());
-          if (spent >= most_cells || o.depth >= kDeepestCell || !loose(o)) continue;
-          const Cell& c = o.leaf.cell;
-          splittings_.push_back({&out_.even[c.patch], &o.leaf, wanted(c), &balls_[c.patch],
-                                 o.leaf.bounds.split_u, &halves_[chosen_.size()]});
+          if (spent >= most_cells || leaf.depth >= kDeepestCell || !loose(leaf)) continue;
+          const Cell& c = leaf.cell;
+          splittings_.push_back({&out_.even[c.patch], &leaf, wanted(c), &balls_[c.patch], leaf.bounds.split_u,
+                                 &halves_[chosen_.size()]});
           chosen_.push_back(level[at]);
         }
         split_all(splittings_, &out_.cells);
@@ -537,12 +534,12 @@ class Bounder {
           auto& [a, b] = halves_[k];
           see(a);
           see(b);
-          Open& o = open_[chosen_[k]];
-          o = {std::move(a), o.depth + 1};
+          Leaf& leaf = out_.leaves[chosen_[k]];
+          a.depth = b.depth = leaf.depth + 1;
+          leaf = a;
           next.push_back(chosen_[k]);
-          next.push_back(static_cast<int>(open_.size()));
-          const int depth = o.depth;
-          open_.push_back({std::move(b), depth});
+          next.push_back(static_cast<int>(out_.leaves.size()));
+          out_.leaves.push_back(b);
         }
       }
       level.swap(next);
@@ -550,35 +547,35 @@ class Bounder {
   }
 
   // The least radius first: with none at all no ball rolls inside, and every answer is dear.
-  bool least_loose(const Open& o) const {
-    const bool normals = o.leaf.bounds.regular || left_as_sliver(o);
-    return !normals || o.leaf.bounds.min_radius < out_.seen_min / kRadiusTightness;
+  bool least_loose(const Leaf& leaf) const {
+    const bool normals = leaf.bounds.regular || left_as_sliver(leaf);
+    return !normals || leaf.bounds.min_radius < out_.seen_min / kRadiusTightness;
   }
 
-  bool left_as_sliver(const Open& o) const {
-    return balls_[o.leaf.cell.patch].radius > 0 && o.depth >= kDeepestOnBall;
+  bool left_as_sliver(const Leaf& leaf) const {
+    return balls_[leaf.cell.patch].radius > 0 && leaf.depth >= kDeepestOnBall;
   }
 
-  bool unproven(const Open& o) const {
-    const CellBounds& b = o.leaf.bounds;
-    return !left_as_sliver(o) && !b.convex && b.seen_curvature > 0 && !is_flat(b, shape_.bounding_radius);
+  bool unproven(const Leaf& leaf) const {
+    const CellBounds& b = leaf.bounds;
+    return !left_as_sliver(leaf) && !b.convex && b.seen_curvature > 0 && !is_flat(b, shape_.bounding_radius);
   }
 
-  bool bent(const Open& o) const { return o.leaf.bounds.seen_curvature > kBent / shape_.bounding_radius; }
+  bool bent(const Leaf& leaf) const { return leaf.bounds.seen_curvature > kBent / shape_.bounding_radius; }
 
-  bool radii_loose(const Open& o) const {
-    const CellBounds& b = o.leaf.bounds;
+  bool radii_loose(const Leaf& leaf) const {
+    const CellBounds& b = leaf.bounds;
     if (!b.convex || sphere_) return false;
     return b.min_radius < out_.seen_min / kRadiusTightness || b.max_radius > kRadiusTightness * out_.seen_max;
   }
 
-  bool unrated(const Open& o) const { return !(o.leaf.bounds.rate < kInfinity) && wants_rate(o.leaf.cell); }
+  bool unrated(const Leaf& leaf) const { return !(leaf.bounds.rate < kInfinity) && wants_rate(leaf.cell); }
 
-  bool rate_loose(const Open& o) const {
-    const CellBounds& b = o.leaf.bounds;
-    if (sphere_) return b.convex && unrated(o);
+  bool rate_loose(const Leaf& leaf) const {
+    const CellBounds& b = leaf.bounds;
+    if (sphere_) return b.convex && unrated(leaf);
     if (!b.convex || b.seen_rate == 0 || b.seen_rate > kUselessRate * shape_.bounding_radius) return false;
-    const double floor = std::max(kRateFloor * seen_rate_[o.leaf.cell.patch], kSmallRate * out_.seen_max);
+    const double floor = std::max(kRateFloor * seen_rate_[leaf.cell.patch], kSmallRate * out_.seen_max);
     return b.rate > kRateTightness * std::max(b.seen_rate, floor);
   }
 
@@ -634,7 +631,6 @@ class Bounder {
   const int patches_;
   bool with_rates_ = false, sphere_ = false, hollow_ = false;
   std::vector<std::pair<Change, Change>> changes_;
-  std::vector<Open> open_;
   std::vector<Splitting> splittings_;  // of halve_while
   std::vector<int> chosen_;
   std::array<Halves, kSplitAtOnce> halves_;
@@ -693,10 +689,10 @@ void refine(const Loose& loose, int cells, Wanted wanted, int* spent, SurfaceBou
       }
       split_all(splittings, spent);
       for (size_t k = 0; k < chosen.size(); ++k) {
-        leaves[chosen[k]] = std::move(halves[k].first);
+        leaves[chosen[k]] = halves[k].first;
         next.push_back(chosen[k]);
         next.push_back(static_cast<int>(leaves.size()));
-        leaves.push_back(std::move(halves[k].second));
+        leaves.push_back(halves[k].second);
       }
     }
     level.swap(next);
