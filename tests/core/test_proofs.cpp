@@ -116,6 +116,46 @@ TEST(Enclosure, holds_at_every_point_of_every_cell) {
     }
 }
 
+// As loading does, of cells of all kinds in one call: poles, weights, degrees, both orders of derivatives.
+TEST(Enclosure, of_cells_side_by_side_is_that_of_each) {
+  Random random(9);
+  const std::vector<ShapePointer> shapes = {ellipsoid(), smooth_pebble(), polar(), kinked()};
+  std::vector<Cell> cells(150);
+  std::vector<Enclosed> all;
+  for (Cell& cell : cells) {
+    const Shape& shape = *shapes[random.below(4)];
+    cell.patch = random.below(static_cast<int>(shape.patches.size()));
+    for (int edge = 0; edge < 4; ++edge)
+      if (shape.links[cell.patch][edge].collapsed) cell.pole = edge;
+    for (int depth = random.whole(0, 8); depth > 0; --depth) {
+      Cell a, b;
+      halve(cell, random.below(2), &a, &b);
+      cell = random.below(2) ? a : b;
+    }
+    all.push_back({&shape.patches[cell.patch], &cell, {random.below(2) == 1, random.below(2) == 1}, {}});
+  }
+  enclose(all.data(), static_cast<int>(all.size()));
+  int rated = 0;
+  for (const Enclosed& one : all) {
+    Enclosed alone{one.patch, one.cell, one.wanted, {}};
+    enclose(&alone, 1);
+    const CellBounds &a = one.bounds, &b = alone.bounds;
+    ASSERT_EQ(a.regular, b.regular);
+    ASSERT_EQ(a.convex, b.convex);
+    EXPECT_NEAR((a.axis - b.axis).norm(), 0, 1e-9);
+    EXPECT_NEAR(a.cone, b.cone, 1e-9);
+    const auto near = [](double x, double y) { return x == y || std::abs(x - y) <= 1e-7 * std::abs(y); };
+    EXPECT_PRED2(near, a.min_radius, b.min_radius);
+    EXPECT_PRED2(near, a.max_radius, b.max_radius);
+    EXPECT_PRED2(near, a.rate, b.rate);
+    EXPECT_PRED2(near, a.speed_u, b.speed_u);
+    EXPECT_PRED2(near, a.stretch.most, b.stretch.most);
+    EXPECT_PRED2(near, a.seen_rate, b.seen_rate);
+    rated += a.rate > 0 && a.rate < 1e300;
+  }
+  EXPECT_GT(rated, 20);
+}
+
 // Sides of plates are needles: what is nothing of the body's size is an angle there.
 TEST(Enclosure, of_needles_that_are_not_quite_plane) {
   Random random(8);
