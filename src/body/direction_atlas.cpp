@@ -3,11 +3,13 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "body/cube_map.h"
 #include "body/shape.h"
 #include "body/support.h"
 #include "nurbs/tolerances.h"
+#include "nurbs/wide.h"
 
 namespace nurbs {
 Vec3 DirectionAtlas::direction(int node) const {
@@ -52,36 +54,58 @@ double DirectionAtlas::support_upper(const Vec3& d) const {
 
 namespace {
 
-// A few points of every patch, to start the first support searches from.
-struct Sample {
-  SurfacePoint where;
-  Vec3 point;
+// A few points of every patch, to start the first support searches from; coordinates by kWidth side by side,
+// the last ones repeated.
+struct Samples {
+  std::vector<SurfacePoint> where;
+  std::vector<Triple<Wide>> points;
 };
 
-std::vector<Sample> sample_patches(const Shape& shape) {
-  std::vector<Sample> samples;
-  samples.reserve(shape.patches.size() * kAtlasSamples * kAtlasSamples);
+Samples sample_patches(const Shape& shape) {
+  Samples samples;
+  Vec3 point = Vec3::Zero();
+  const auto add = [&](size_t number) {
+    if (number % kWidth == 0) samples.points.emplace_back();
+    set_lane(triple(point), static_cast<int>(number % kWidth), &samples.points.back());
+  };
   for (size_t p = 0; p < shape.patches.size(); ++p)
     for (int i = 0; i < kAtlasSamples; ++i)
       for (int j = 0; j < kAtlasSamples; ++j) {
         const SurfacePoint at{static_cast<int>(p), (i + 0.5) / kAtlasSamples, (j + 0.5) / kAtlasSamples};
-        samples.push_back({at, evaluate0(shape.patches[p], at.u, at.v)});
+        point = evaluate0(shape.patches[p], at.u, at.v);
+        add(samples.where.size());
+        samples.where.push_back(at);
       }
+  for (size_t number = samples.where.size(); number % kWidth != 0; ++number) add(number);
   return samples;
 }
 
-const Sample& best_sample(const std::vector<Sample>& samples, const Vec3& d) {
-  const Sample* best = samples.data();
-  for (const Sample& s : samples)
-    if (d.dot(s.point) > d.dot(best->point)) best = &s;
-  return *best;
+// The first of the highest ones.
+const SurfacePoint& best_sample(const Samples& samples, const Vec3& d) {
+  const Triple<Wide> to{all<Wide>(d[0]), all<Wide>(d[1]), all<Wide>(d[2])};
+  Wide most = all<Wide>(-std::numeric_limits<double>::infinity()), block = all<Wide>(0);
+  for (size_t k = 0; k < samples.points.size(); ++k) {
+    const Wide height = dot(to, samples.points[k]);
+    const WideMask higher = height > most;
+    most = select(higher, height, most);
+    block = select(higher, all<Wide>(static_cast<double>(k)), block);
+  }
+  size_t best = 0;
+  double highest = -std::numeric_limits<double>::infinity();
+  for (int l = 0; l < kWidth; ++l) {
+    const size_t number = std::min(static_cast<size_t>(block[l]) * kWidth + l, samples.where.size() - 1);
+    if (most[l] < highest || (most[l] == highest && number > best)) continue;
+    highest = most[l];
+    best = number;
+  }
+  return samples.where[best];
 }
 
 }  // namespace
 
 DirectionAtlas make_atlas(const Shape& shape, int cells) {
   DirectionAtlas atlas;
-  const std::vector<Sample> samples = sample_patches(shape);
+  const Samples samples = sample_patches(shape);
   const size_t count = 6u * static_cast<size_t>((cells + 1) * (cells + 1));
   atlas.cells = cells;
   atlas.support.assign(count, 0);
@@ -91,7 +115,7 @@ DirectionAtlas make_atlas(const Shape& shape, int cells) {
     const Vec3 cube = atlas.direction(static_cast<int>(node));
     const double length = cube.norm();
     const Vec3 d = cube / length;
-    const Support support = find_hull_support(shape, d, &best_sample(samples, d).where);
+    const Support support = find_hull_support(shape, d, &best_sample(samples, d));
     atlas.support[node] = support.upper * length;
     atlas.point[node] = support.point;
     atlas.where[node] = support.where;

@@ -16,42 +16,17 @@
 // value theorem): everything is regular there.
 #pragma once
 
-#include <algorithm>
-#include <array>
 #include <vector>
 
 #include "nurbs/bezier_patch.h"
 
 namespace nurbs {
 
-// A net, in place up to biquartic ones: thousands of cells are made and left.
-class CellNet {
- public:
-  void assign(const std::vector<Vec4>& points) {
-    size_ = points.size();
-    if (size_ > few_.size())
-      many_ = points;
-    else
-      std::copy(points.begin(), points.end(), few_.begin());
-  }
-  std::size_t size() const { return size_; }
-  Vec4* data() { return size_ > few_.size() ? many_.data() : few_.data(); }
-  const Vec4* data() const { return size_ > few_.size() ? many_.data() : few_.data(); }
-  const Vec4& operator[](std::size_t i) const { return data()[i]; }
-
- private:
-  std::size_t size_ = 0;
-  std::array<Vec4, 25> few_;
-  std::vector<Vec4> many_;
-};
-
-// A rectangle of a patch with its own net.
+// A rectangle of a patch; whole as it is made.
 struct Cell {
   int patch = 0;
   int pole = -1;  // edge of the patch that is a smooth pole, or -1
   double u0 = 0, v0 = 0, du = 1, dv = 1;
-  CellNet net;          // homogeneous, v fastest
-  std::vector<Vec4> z;  // (z w, 0) of a patch with a pole, one degree less towards it
 };
 
 // W(v, v) >= most (v . along)^2 + least (v . other)^2 for every tangent v of a cell, `along` and `other` at
@@ -78,16 +53,23 @@ struct CellBounds {
   double doubt = 0;  // how much tangents and normal vary over the cell, relatively: what halving is to lessen
 };
 
-Cell whole_patch(const std::vector<BezierPatch>& patches, int patch);
-// Names the pole of a whole patch.
-void set_pole(const BezierPatch& patch, int edge, Cell* cell);
-void halve(const BezierPatch& patch, const Cell& cell, bool in_u, Cell* first, Cell* second);
+void halve(const Cell& cell, bool in_u, Cell* first, Cell* second);
+// Its own control net, homogeneous, v fastest.
+std::vector<Vec4> net_of(const BezierPatch& patch, const Cell& cell);
 
 // What is asked for beside normals and curvature radii: the rate costs as much again.
 struct Wanted {
   bool rate = false, stretch = false;
 };
-// Bounds over a cell. About 1 us for a biquartic patch.
+// Bounds over a cell. Several are enclosed side by side where they are of one kind (degrees, pole, what is
+// wanted), for a third of the cost or less.
+struct Enclosed {
+  const BezierPatch* patch;
+  const Cell* cell;
+  Wanted wanted;
+  CellBounds bounds;  // the result
+};
+void enclose(Enclosed* cells, int count);
 CellBounds enclose(const BezierPatch& patch, const Cell& cell, Wanted wanted);
 
 }  // namespace nurbs

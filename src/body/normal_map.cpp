@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <vector>
 
 #include "body/connectivity.h"
 #include "body/cube_map.h"
@@ -24,20 +25,39 @@ void paint(const Vec3& center, double angle, double radius, NormalMap& map) {
               [&](int cell) { map.radius[cell] = std::max(map.radius[cell], value); });
 }
 
-// The same for caps of any width.
-void paint_wide(const Vec3& center, double angle, double radius, NormalMap& map) {
-  const float value = std::nextafter(static_cast<float>(radius), std::numeric_limits<float>::infinity());
-  const double reach = angle + 1.5 / map.cells;  // half a cell's diagonal, at most
-  const double cosine = reach < M_PI ? std::cos(reach) - kRoundoff : -2;
-  for (int face = 0; face < 6; ++face)
-    for (int i = 0; i < map.cells; ++i)
-      for (int j = 0; j < map.cells; ++j) {
-        float& cell = map.radius[(face * map.cells + i) * map.cells + j];
-        if (cell >= value) continue;
-        const Vec3 d = cell_middle(face, i, j, map.cells);
-        if (d.dot(center) >= cosine * d.norm()) cell = value;
-      }
-}
+// The same for caps of any width, over all cells.
+class WidePainter {
+ public:
+  void paint(const Vec3& center, double angle, double radius, NormalMap& map) {
+    const float value = std::nextafter(static_cast<float>(radius), std::numeric_limits<float>::infinity());
+    if (x_.empty()) set_up(map.cells);
+    const double reach = angle + 1.5 / map.cells;  // half a cell's diagonal, at most
+    const double cosine = reach < M_PI ? std::cos(reach) - kRoundoff : -2;
+    float* const to = map.radius.data();
+    const double *x = x_.data(), *y = y_.data(), *z = z_.data(), *norm = norm_.data();
+    const double a = center[0], b = center[1], c = center[2];
+    const size_t count = x_.size();
+    for (size_t k = 0; k < count; ++k) {  // a loop for vectors
+      const float painted = a * x[k] + b * y[k] + c * z[k] >= cosine * norm[k] ? value : 0;
+      to[k] = std::max(to[k], painted);
+    }
+  }
+
+ private:
+  void set_up(int cells) {
+    for (int face = 0; face < 6; ++face)
+      for (int i = 0; i < cells; ++i)
+        for (int j = 0; j < cells; ++j) {
+          const Vec3 d = cell_middle(face, i, j, cells);
+          x_.push_back(d[0]);
+          y_.push_back(d[1]);
+          z_.push_back(d[2]);
+          norm_.push_back(d.norm());
+        }
+  }
+
+  std::vector<double> x_, y_, z_, norm_;  // through the cells' middles
+};
 
 class Painter {
  public:
@@ -50,7 +70,7 @@ class Painter {
     if (angle <= kNormalCap)
       paint(b.axis, angle, radius, map_);
     else
-      paint_wide(b.axis, angle, radius, map_);
+      wide_.paint(b.axis, angle, radius, map_);
   }
 
   // Creases that open are left as they are: on the surface at a small distance e outside they are tubes, and
@@ -97,6 +117,7 @@ class Painter {
 
   const Shape& shape_;
   NormalMap& map_;
+  WidePainter wide_;
 };
 
 }  // namespace

@@ -3,6 +3,7 @@
 
 #include <Eigen/QR>
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <numeric>
@@ -28,21 +29,15 @@ constexpr double kSurelyTurned = 1e-6;  // least over largest coefficient of a v
 constexpr double kMostBent = 0.1;  // of a curvature: a patch on a ball in which it is known worse is a sliver
 constexpr double kBent = 1e-3;     // over the bounding radius: a curvature worth it
 
-struct Open {
-  Leaf leaf;
-  int depth = 0;
-};
-
 bool smooth_pole(const EdgeLink& link, double size) {
   return link.collapsed && link.kink_bound <= kNoKink && link.gap <= kJointRoundoff * size;
 }
 
 // Strips at poles first, so that cells lie in one or outside. Of a patch with a pole at either end each half
 // has its own; one with poles at neighbouring edges has none that serves.
-std::vector<Cell> first_cells(const Shape& shape, const std::vector<BezierPatch>& even, int patch) {
+std::vector<Cell> first_cells(const Shape& shape, int patch) {
   const auto& links = shape.links[patch];
-  const BezierPatch& surface = even[patch];
-  const Cell whole = whole_patch(even, patch);
+  const Cell whole{patch};
   const auto smooth = [&](int edge) { return smooth_pole(links[edge], shape.bounding_radius); };
   std::vector<Cell> cells;
   for (const int low : {0, 2}) {
@@ -53,13 +48,13 @@ std::vector<Cell> first_cells(const Shape& shape, const std::vector<BezierPatch>
       const int pole = smooth(edge)                                           ? edge
                        : !links[edge].collapsed && smooth(low + 1 - edge % 2) ? low + 1 - edge % 2
                                                                               : -1;
-      if (pole >= 0) set_pole(surface, pole, &c);
+      if (pole >= 0) c.pole = pole;
       Cell first, second;
-      halve(surface, c, edge < 2, &first, &second);
+      halve(c, edge < 2, &first, &second);
       c = edge % 2 ? std::move(second) : std::move(first);
       while (links[edge].collapsed && (edge < 2 ? c.du : c.dv) > kPoleStrip) {
         Cell lower, upper;
-        halve(surface, c, edge < 2, &lower, &upper);
+        halve(c, edge < 2, &lower, &upper);
         if (edge % 2) std::swap(lower, upper);
         cells.push_back(std::move(upper));
         c = std::move(lower);
@@ -244,12 +239,13 @@ void on_ball(const Ball& ball, const BezierPatch& patch, Leaf* leaf) {
   const int p = patch.degree_u, q = patch.degree_v;
   if (!out.regular) {
     Form<Vec3> x(p, q, Vec3::Zero()), u(p - 1, q, Vec3::Zero()), v(p, q - 1, Vec3::Zero());
+    const std::vector<Vec4> net = net_of(patch, leaf->cell);
     double heaviest = 0, lightest = kInfinity, weight_u = 0, weight_v = 0, speed_u = 0, speed_v = 0;
     Vec3 axis = Vec3::Zero();
-    const auto weight = [&](int i, int j) { return leaf->cell.net[i * (q + 1) + j][3]; };
+    const auto weight = [&](int i, int j) { return net[i * (q + 1) + j][3]; };
     for (int i = 0; i <= p; ++i)
       for (int j = 0; j <= q; ++j) {
-        const Vec4& c = leaf->cell.net[i * (q + 1) + j];
+        const Vec4& c = net[i * (q + 1) + j];
         x(i, j) = c.head<3>() - c[3] * ball.center;
         axis += x(i, j);
         heaviest = std::max(heaviest, c[3]);
@@ -316,32 +312,65 @@ void inherit(const CellBounds& whole, CellBounds* half) {
   half->speed_v = std::max(half->speed_v, whole.speed_v);
 }
 
-// Halves of a leaf the better way: where little is known yet both ways are tried, since a needle's cells are
+using Halves = std::pair<Leaf, Leaf>;
+constexpr int kSplitAtOnce = 16;  // leaves whose halves are enclosed side by side
+
+// A leaf to be halved, of which patch; `ball` may be null.
+struct Splitting {
+  const BezierPatch* patch;
+  const Leaf* leaf;
+  Wanted wanted;
+  const Ball* ball;
+  bool in_u;
+  Halves* to;
+};
+
+void halve_all(const std::vector<Splitting>& all, int* cells) {
+  std::vector<Enclosed> halves;
+  halves.reserve(2 * all.size());
+  for (const Splitting& s : all) {
+    halve(s.leaf->cell, s.in_u, &s.to->first.cell, &s.to->second.cell);
+    for (Leaf* half : {&s.to->first, &s.to->second}) halves.push_back({s.patch, &half->cell, s.wanted, {}});
+  }
+  enclose(halves.data(), static_cast<int>(halves.size()));
+  *cells += static_cast<int>(halves.size());
+  const Enclosed* next = halves.data();
+  for (const Splitting& s : all)
+    for (Leaf* half : {&s.to->first, &s.to->second}) {
+      half->bounds = (next++)->bounds;
+      inherit(s.leaf->bounds, &half->bounds);
+      if (s.ball) on_ball(*s.ball, *s.patch, half);
+    }
+}
+
+// Halves of leaves the better way: where little is known yet both ways are tried, since a needle's cells are
 // a thousand times longer than wide. A way is as good as the better half: the other one may hold what makes
 // the doubt. Where neither helps the cell is a strip that bends more than it is wide, and is cut across.
-std::pair<Leaf, Leaf> split(const BezierPatch& patch, const Leaf& leaf, Wanted wanted, const Ball& ball,
-                            int* cells) {
-  const auto halves = [&](bool in_u) {
-    std::pair<Leaf, Leaf> pair;
-    halve(patch, leaf.cell, in_u, &pair.first.cell, &pair.second.cell);
-    for (Leaf* half : {&pair.first, &pair.second}) {
-      ++*cells;
-      half->bounds = enclose(patch, half->cell, wanted);
-      inherit(leaf.bounds, &half->bounds);
-      on_ball(ball, patch, half);
-    }
-    return pair;
-  };
-  const bool in_u = leaf.bounds.split_u;
-  std::pair<Leaf, Leaf> best = halves(in_u);
-  if ((leaf.bounds.convex || leaf.bounds.doubt < kLittleDoubt) && leaf.bounds.cone < kWideCone) return best;
-  std::pair<Leaf, Leaf> other = halves(!in_u);
-  const auto doubt = [](const std::pair<Leaf, Leaf>& p) {
-    return std::min(p.first.bounds.doubt, p.second.bounds.doubt);
-  };
-  const bool neither = std::min(doubt(best), doubt(other)) >= leaf.bounds.doubt;
-  const bool turn = neither ? (leaf.cell.du >= leaf.cell.dv) != in_u : doubt(other) < doubt(best);
-  return turn ? other : best;
+// `all` has the likely way; results in its `to`.
+void split_all(const std::vector<Splitting>& all, int* cells) {
+  halve_all(all, cells);
+  std::vector<Splitting> doubtful;
+  for (const Splitting& s : all) {
+    const CellBounds& b = s.leaf->bounds;
+    if (!((b.convex || b.doubt < kLittleDoubt) && b.cone < kWideCone)) doubtful.push_back(s);
+  }
+  if (doubtful.empty()) return;
+  std::vector<Halves> others(doubtful.size());
+  for (size_t k = 0; k < doubtful.size(); ++k) {
+    doubtful[k].in_u = !doubtful[k].in_u;
+    doubtful[k].to = &others[k];
+  }
+  halve_all(doubtful, cells);
+  const auto doubt = [](const Halves& p) { return std::min(p.first.bounds.doubt, p.second.bounds.doubt); };
+  size_t next = 0;
+  for (const Splitting& s : all) {
+    if (next == doubtful.size() || doubtful[next].leaf != s.leaf) continue;
+    Halves& other = others[next++];
+    const Leaf& leaf = *s.leaf;
+    const bool neither = std::min(doubt(*s.to), doubt(other)) >= leaf.bounds.doubt;
+    const bool turn = neither ? (leaf.cell.du >= leaf.cell.dv) != s.in_u : doubt(other) < doubt(*s.to);
+    if (turn) std::swap(*s.to, other);
+  }
 }
 
 // u = r s / (1 + (r - 1) s), s the parameter of the even patch.
@@ -390,7 +419,7 @@ class Bounder {
     share_balls();
     for (int p = 0; p < patches_; ++p) {
       if (const auto plane = plane_bounds(out_.even[p], shape_.bounding_radius)) {
-        open_.push_back({{whole_patch(out_.even, p), *plane, {}}, kDeepestCell});  // nothing is left to find
+        out_.leaves.push_back({Cell{p}, *plane, {}, kDeepestCell});  // nothing is left to find
         ++out_.cells;
         continue;
       }
@@ -398,35 +427,37 @@ class Bounder {
       const double known = rounding(shape_.patches[p]);
       // Planes, whose radius is infinite, are looked at all the same.
       const double round = std::max(known < kFarAway ? known : 0, balls_[p].radius * (1 - balls_[p].bent));
-      for (Cell& c : first_cells(shape_, out_.even, p)) {
-        Leaf leaf{std::move(c), {}, {}};
+      for (Cell& c : first_cells(shape_, p)) {
+        Leaf leaf;
+        leaf.cell = c;
         leaf.bounds = enclose(out_.even[p], leaf.cell, wanted(leaf.cell));
         on_ball(balls_[p], out_.even[p], &leaf);
         leaf.bounds.min_radius = std::max(leaf.bounds.min_radius, round);
         if (bulging) leaf.bounds.least_curvature = std::max(leaf.bounds.least_curvature, 0.0);
         ++out_.cells;
         see(leaf);
-        open_.push_back({std::move(leaf), 0});
+        out_.leaves.push_back(leaf);
       }
     }
     const int most = kMostCells + kMostCellsPerPatch * patches_;
-    if (!sphere_) halve_while([this](const Open& o) { return least_loose(o); }, kLeastRadiusBudget * most);
+    if (!sphere_)
+      halve_while([this](const Leaf& leaf) { return least_loose(leaf); }, kLeastRadiusBudget * most);
     const int base = std::max(most, out_.cells + most / 2);
-    halve_while([this](const Open& o) { return o.depth < kDeepestUnproven && unproven(o); }, base);
-    halve_while([this](const Open& o) { return !hollow_ && unproven(o) && bent(o); }, kConvexBudget * most);
-    halve_while([this](const Open& o) { return radii_loose(o); }, std::max(most, out_.cells + most / 2));
+    halve_while([this](const Leaf& leaf) { return leaf.depth < kDeepestUnproven && unproven(leaf); }, base);
+    halve_while([this](const Leaf& leaf) { return !hollow_ && unproven(leaf) && bent(leaf); },
+                kConvexBudget * most);
+    halve_while([this](const Leaf& leaf) { return radii_loose(leaf); },
+                std::max(most, out_.cells + most / 2));
     if (!wanted_.rate) return leave();
     begin_rates();
     const int enough = out_.cells + kMostRateCells + kMostCellsPerPatch * patches_;
-    halve_while([this](const Open& o) { return unrated(o) && rate_loose(o); }, enough);
-    halve_while([this](const Open& o) { return rate_loose(o); }, enough);
+    halve_while([this](const Leaf& leaf) { return unrated(leaf) && rate_loose(leaf); }, enough);
+    halve_while([this](const Leaf& leaf) { return rate_loose(leaf); }, enough);
     return leave();
   }
 
  private:
   SurfaceBounds leave() {
-    out_.leaves.reserve(open_.size());
-    for (Open& o : open_) out_.leaves.push_back(std::move(o.leaf));
     finish();
     return std::move(out_);
   }
@@ -448,13 +479,21 @@ class Bounder {
   // Radii come first, without rates, which cost as much again.
   void begin_rates() {
     with_rates_ = true;
-    for (Open& o : open_) {
-      if (!o.leaf.bounds.convex || !wants_rate(o.leaf.cell)) continue;
-      CellBounds rated = enclose(out_.even[o.leaf.cell.patch], o.leaf.cell, {true, wanted_.stretch});
-      inherit(o.leaf.bounds, &rated);
-      o.leaf.bounds = rated;
-      on_ball(balls_[o.leaf.cell.patch], out_.even[o.leaf.cell.patch], &o.leaf);
-      see_rate(o.leaf);
+    std::vector<Enclosed> cells;
+    std::vector<Leaf*> leaves;
+    for (Leaf& leaf : out_.leaves) {
+      const Cell& c = leaf.cell;
+      if (!leaf.bounds.convex || !wants_rate(c)) continue;
+      cells.push_back({&out_.even[c.patch], &c, {true, wanted_.stretch}, {}});
+      leaves.push_back(&leaf);
+    }
+    enclose(cells.data(), static_cast<int>(cells.size()));
+    for (size_t k = 0; k < leaves.size(); ++k) {
+      Leaf& leaf = *leaves[k];
+      inherit(leaf.bounds, &cells[k].bounds);
+      leaf.bounds = cells[k].bounds;
+      on_ball(balls_[leaf.cell.patch], *cells[k].patch, &leaf);
+      see_rate(leaf);
     }
   }
   void see_rate(const Leaf& leaf) {
@@ -474,57 +513,69 @@ class Bounder {
   // What is not loose stays so, as what is seen can only move the aims outward: leaves are looked at once.
   template <class Loose>
   void halve_while(const Loose& loose, int most_cells) {
-    std::vector<int> level(open_.size()), next;
+    std::vector<int> level(out_.leaves.size()), next;
     std::iota(level.begin(), level.end(), 0);
     while (!level.empty() && out_.cells < most_cells) {
       next.clear();
-      for (const int i : level) {
-        Open& o = open_[i];
-        if (out_.cells >= most_cells || o.depth >= kDeepestCell || !loose(o)) continue;
-        const int depth = o.depth + 1;
-        const int p = o.leaf.cell.patch;
-        auto [a, b] = split(out_.even[p], o.leaf, wanted(o.leaf.cell), balls_[p], &out_.cells);
-        see(a);
-        see(b);
-        o = {std::move(a), depth};
-        next.push_back(i);
-        next.push_back(static_cast<int>(open_.size()));
-        open_.push_back({std::move(b), depth});
+      for (size_t at = 0; at < level.size();) {
+        splittings_.clear();
+        chosen_.clear();
+        for (; at < level.size() && static_cast<int>(chosen_.size()) < kSplitAtOnce; ++at) {
+          const Leaf& leaf = out_.leaves[level[at]];
+          const int spent = out_.cells + 2 * static_cast<int>(chosen_.size());
+          if (spent >= most_cells || leaf.depth >= kDeepestCell || !loose(leaf)) continue;
+          const Cell& c = leaf.cell;
+          splittings_.push_back({&out_.even[c.patch], &leaf, wanted(c), &balls_[c.patch], leaf.bounds.split_u,
+                                 &halves_[chosen_.size()]});
+          chosen_.push_back(level[at]);
+        }
+        split_all(splittings_, &out_.cells);
+        for (size_t k = 0; k < chosen_.size(); ++k) {
+          auto& [a, b] = halves_[k];
+          see(a);
+          see(b);
+          Leaf& leaf = out_.leaves[chosen_[k]];
+          a.depth = b.depth = leaf.depth + 1;
+          leaf = a;
+          next.push_back(chosen_[k]);
+          next.push_back(static_cast<int>(out_.leaves.size()));
+          out_.leaves.push_back(b);
+        }
       }
       level.swap(next);
     }
   }
 
   // The least radius first: with none at all no ball rolls inside, and every answer is dear.
-  bool least_loose(const Open& o) const {
-    const bool normals = o.leaf.bounds.regular || left_as_sliver(o);
-    return !normals || o.leaf.bounds.min_radius < out_.seen_min / kRadiusTightness;
+  bool least_loose(const Leaf& leaf) const {
+    const bool normals = leaf.bounds.regular || left_as_sliver(leaf);
+    return !normals || leaf.bounds.min_radius < out_.seen_min / kRadiusTightness;
   }
 
-  bool left_as_sliver(const Open& o) const {
-    return balls_[o.leaf.cell.patch].radius > 0 && o.depth >= kDeepestOnBall;
+  bool left_as_sliver(const Leaf& leaf) const {
+    return balls_[leaf.cell.patch].radius > 0 && leaf.depth >= kDeepestOnBall;
   }
 
-  bool unproven(const Open& o) const {
-    const CellBounds& b = o.leaf.bounds;
-    return !left_as_sliver(o) && !b.convex && b.seen_curvature > 0 && !is_flat(b, shape_.bounding_radius);
+  bool unproven(const Leaf& leaf) const {
+    const CellBounds& b = leaf.bounds;
+    return !left_as_sliver(leaf) && !b.convex && b.seen_curvature > 0 && !is_flat(b, shape_.bounding_radius);
   }
 
-  bool bent(const Open& o) const { return o.leaf.bounds.seen_curvature > kBent / shape_.bounding_radius; }
+  bool bent(const Leaf& leaf) const { return leaf.bounds.seen_curvature > kBent / shape_.bounding_radius; }
 
-  bool radii_loose(const Open& o) const {
-    const CellBounds& b = o.leaf.bounds;
+  bool radii_loose(const Leaf& leaf) const {
+    const CellBounds& b = leaf.bounds;
     if (!b.convex || sphere_) return false;
     return b.min_radius < out_.seen_min / kRadiusTightness || b.max_radius > kRadiusTightness * out_.seen_max;
   }
 
-  bool unrated(const Open& o) const { return !(o.leaf.bounds.rate < kInfinity) && wants_rate(o.leaf.cell); }
+  bool unrated(const Leaf& leaf) const { return !(leaf.bounds.rate < kInfinity) && wants_rate(leaf.cell); }
 
-  bool rate_loose(const Open& o) const {
-    const CellBounds& b = o.leaf.bounds;
-    if (sphere_) return b.convex && unrated(o);
+  bool rate_loose(const Leaf& leaf) const {
+    const CellBounds& b = leaf.bounds;
+    if (sphere_) return b.convex && unrated(leaf);
     if (!b.convex || b.seen_rate == 0 || b.seen_rate > kUselessRate * shape_.bounding_radius) return false;
-    const double floor = std::max(kRateFloor * seen_rate_[o.leaf.cell.patch], kSmallRate * out_.seen_max);
+    const double floor = std::max(kRateFloor * seen_rate_[leaf.cell.patch], kSmallRate * out_.seen_max);
     return b.rate > kRateTightness * std::max(b.seen_rate, floor);
   }
 
@@ -580,7 +631,9 @@ class Bounder {
   const int patches_;
   bool with_rates_ = false, sphere_ = false, hollow_ = false;
   std::vector<std::pair<Change, Change>> changes_;
-  std::vector<Open> open_;
+  std::vector<Splitting> splittings_;  // of halve_while
+  std::vector<int> chosen_;
+  std::array<Halves, kSplitAtOnce> halves_;
   std::vector<double> seen_rate_;
   std::vector<Ball> balls_;
   SurfaceBounds out_;
@@ -615,18 +668,32 @@ namespace {
 template <class Loose>
 void refine(const Loose& loose, int cells, Wanted wanted, int* spent, SurfaceBounds* bounds) {
   std::vector<Leaf>& leaves = bounds->leaves;
-  std::vector<int> level(leaves.size()), next;
+  std::vector<int> level(leaves.size()), next, chosen;
   std::iota(level.begin(), level.end(), 0);
+  std::vector<Splitting> splittings;
+  std::vector<Halves> halves(kSplitAtOnce);
   while (!level.empty()) {
     next.clear();
-    for (const int i : level) {
-      Leaf& leaf = leaves[i];
-      if (*spent >= cells || !loose(leaf.bounds) || leaf.cell.du * leaf.cell.dv < kLeastNormalCell) continue;
-      auto [a, b] = split(bounds->even[leaf.cell.patch], leaf, wanted, {}, spent);
-      leaf = std::move(a);
-      next.push_back(i);
-      next.push_back(static_cast<int>(leaves.size()));
-      leaves.push_back(std::move(b));
+    for (size_t at = 0; at < level.size();) {
+      splittings.clear();
+      chosen.clear();
+      for (; at < level.size() && static_cast<int>(chosen.size()) < kSplitAtOnce; ++at) {
+        const Leaf& leaf = leaves[level[at]];
+        const Cell& c = leaf.cell;
+        if (*spent + 2 * static_cast<int>(chosen.size()) >= cells || !loose(leaf.bounds) ||
+            c.du * c.dv < kLeastNormalCell)
+          continue;
+        splittings.push_back(
+            {&bounds->even[c.patch], &leaf, wanted, nullptr, leaf.bounds.split_u, &halves[chosen.size()]});
+        chosen.push_back(level[at]);
+      }
+      split_all(splittings, spent);
+      for (size_t k = 0; k < chosen.size(); ++k) {
+        leaves[chosen[k]] = halves[k].first;
+        next.push_back(chosen[k]);
+        next.push_back(static_cast<int>(leaves.size()));
+        leaves.push_back(halves[k].second);
+      }
     }
     level.swap(next);
   }

@@ -14,6 +14,7 @@ struct Leaf {
   Cell cell;
   CellBounds bounds;
   SurfacePoint middle;  // in the shape's own parameters
+  int depth = 0;        // halvings of the patch
 };
 
 struct SurfaceBounds {

@@ -104,16 +104,56 @@ TEST(Enclosure, holds_at_every_point_of_every_cell) {
   for (const ShapePointer& shape : shapes)
     for (int trial = 0; trial < 60; ++trial) {
       const int patch = random.below(static_cast<int>(shape->patches.size()));
-      Cell cell = whole_patch(shape->patches, patch);
+      Cell cell{patch};
       for (int edge = 0; edge < 4; ++edge)
-        if (shape->links[patch][edge].collapsed) set_pole(shape->patches[patch], edge, &cell);
+        if (shape->links[patch][edge].collapsed) cell.pole = edge;
       for (int depth = random.whole(4, 14); depth > 0; --depth) {
         Cell a, b;
-        halve(shape->patches[patch], cell, random.below(2), &a, &b);
+        halve(cell, random.below(2), &a, &b);
         cell = random.below(2) ? a : b;
       }
       expect_encloses(*shape, patch, cell, random);
     }
+}
+
+// As loading does, of cells of all kinds in one call: poles, weights, degrees, both orders of derivatives.
+TEST(Enclosure, of_cells_side_by_side_is_that_of_each) {
+  Random random(9);
+  const std::vector<ShapePointer> shapes = {ellipsoid(), smooth_pebble(), polar(), kinked()};
+  std::vector<Cell> cells(150);
+  std::vector<Enclosed> all;
+  for (Cell& cell : cells) {
+    const Shape& shape = *shapes[random.below(4)];
+    cell.patch = random.below(static_cast<int>(shape.patches.size()));
+    for (int edge = 0; edge < 4; ++edge)
+      if (shape.links[cell.patch][edge].collapsed) cell.pole = edge;
+    for (int depth = random.whole(0, 8); depth > 0; --depth) {
+      Cell a, b;
+      halve(cell, random.below(2), &a, &b);
+      cell = random.below(2) ? a : b;
+    }
+    all.push_back({&shape.patches[cell.patch], &cell, {random.below(2) == 1, random.below(2) == 1}, {}});
+  }
+  enclose(all.data(), static_cast<int>(all.size()));
+  int rated = 0;
+  for (const Enclosed& one : all) {
+    Enclosed alone{one.patch, one.cell, one.wanted, {}};
+    enclose(&alone, 1);
+    const CellBounds &a = one.bounds, &b = alone.bounds;
+    ASSERT_EQ(a.regular, b.regular);
+    ASSERT_EQ(a.convex, b.convex);
+    EXPECT_NEAR((a.axis - b.axis).norm(), 0, 1e-9);
+    EXPECT_NEAR(a.cone, b.cone, 1e-9);
+    const auto near = [](double x, double y) { return x == y || std::abs(x - y) <= 1e-7 * std::abs(y); };
+    EXPECT_PRED2(near, a.min_radius, b.min_radius);
+    EXPECT_PRED2(near, a.max_radius, b.max_radius);
+    EXPECT_PRED2(near, a.rate, b.rate);
+    EXPECT_PRED2(near, a.speed_u, b.speed_u);
+    EXPECT_PRED2(near, a.stretch.most, b.stretch.most);
+    EXPECT_PRED2(near, a.seen_rate, b.seen_rate);
+    rated += a.rate > 0 && a.rate < 1e300;
+  }
+  EXPECT_GT(rated, 20);
 }
 
 // Sides of plates are needles: what is nothing of the body's size is an angle there.
@@ -161,14 +201,14 @@ TEST(Enclosure, turned_polar_cells_are_the_same) {
       const size_t p = &patch - shape->patches.data();
       for (int edge = 0; edge < 4; ++edge) {
         if (!shape->links[p][edge].collapsed) continue;
-        Cell cell = whole_patch(shape->patches, static_cast<int>(p));
-        set_pole(patch, edge, &cell);
+        Cell cell{static_cast<int>(p)};
+        cell.pole = edge;
         for (int k = 0; k < 4; ++k) {
           Cell across, beyond;
-          halve(patch, cell, edge < 2, &across, &beyond);
+          halve(cell, edge < 2, &across, &beyond);
           cell = edge % 2 ? beyond : across;
           Cell first, second;
-          halve(patch, cell, edge >= 2, &first, &second);
+          halve(cell, edge >= 2, &first, &second);
           cell = k % 2 ? first : second;
         }
         const CellBounds b = enclose(patch, cell, {});
@@ -336,10 +376,10 @@ TEST(Spikes, are_in_every_enclosure_and_not_in_samples) {
   EXPECT_TRUE(finite > 0 || s.proofs.rate == 0) << "no rate is promised near the rim, or it holds";
   for (int trial = 0; trial < 200; ++trial) {
     const int patch = random.below(static_cast<int>(s.patches.size()));
-    Cell cell = whole_patch(s.patches, patch);
+    Cell cell{patch};
     for (int depth = random.whole(4, 24); depth > 0; --depth) {
       Cell low, high;
-      halve(s.patches[patch], cell, depth % 3 == 0 && random.below(2), &low, &high);
+      halve(cell, depth % 3 == 0 && random.below(2), &low, &high);
       cell = random.below(6) ? low : high;  // towards the rim
     }
     expect_encloses(s, patch, cell, random);
