@@ -68,7 +68,7 @@ class LazyInnerMap {
   bool pays() const { return made_->done || ++made_->without > kDoneWithout; }
   bool made() const { return made_->done; }
 
-  static constexpr int kDoneWithout = 256;  // some 0.1 ms each
+  static constexpr int kDoneWithout = 128;  // some 0.1 ms each
 
  private:
   struct Made {
