@@ -22,8 +22,8 @@ int DirectionAtlas::nearest(const Vec3& d) const {
   const CubePoint c = to_cube(d);
   if (!(c.major > 0)) return 0;
   const double half = 0.5 * cells;
-  const int i = std::clamp(static_cast<int>((c.a + 1) * half + 0.5), 0, cells);
-  const int j = std::clamp(static_cast<int>((c.b + 1) * half + 0.5), 0, cells);
+  const int i = std::clamp(static_cast<int>((c.a + 1) * 2 * half + 1) / 2, 0, cells);
+  const int j = std::clamp(static_cast<int>((c.b + 1) * 2 * half + 1) / 2, 0, cells);
   return (c.face * (cells + 1) + i) * (cells + 1) + j;
 }
 

@@ -51,15 +51,15 @@ std::vector<Cell> first_cells(const Shape& shape, int patch) {
       if (pole >= 0) c.pole = pole;
       Cell first, second;
       halve(c, edge < 2, &first, &second);
-      c = edge % 2 ? std::move(second) : std::move(first);
+      c = edge % 2 ? second : first;
       while (links[edge].collapsed && (edge < 2 ? c.du : c.dv) > kPoleStrip) {
         Cell lower, upper;
         halve(c, edge < 2, &lower, &upper);
         if (edge % 2) std::swap(lower, upper);
-        cells.push_back(std::move(upper));
-        c = std::move(lower);
+        cells.push_back(upper);
+        c = lower;
       }
-      cells.push_back(std::move(c));
+      cells.push_back(c);
     }
     return cells;
   }
