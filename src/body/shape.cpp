@@ -210,14 +210,18 @@ void take_as_sphere(const Shape& s, SurfaceBounds* bounds) {
 
 Proofs summarise(const Shape& s, const SurfaceBounds& bounds, const KinkSummary& kinks) {
   Proofs proofs;
+  const std::vector<bool> bulging = bulging_patches(s.meridian, s.patches, s.bounding_radius);
   for (const Leaf& leaf : bounds.leaves) {
     const double share = leaf.cell.du * leaf.cell.dv / static_cast<double>(s.patches.size());
-    if (is_flat(leaf.bounds, s.bounding_radius))
+    const CellBounds& cell = leaf.bounds;
+    const bool swept = !cell.convex && bulging[leaf.cell.patch],
+               flat = is_flat(cell, s.bounding_radius) ||
+                      (swept && cell.seen_curvature <= kCurvatureNoise / s.bounding_radius);
+    if (flat || swept)
       proofs.flat_share += share;
-    else if (!leaf.bounds.convex)
+    else if (!cell.convex)
       proofs.unproven_share += share;
-    if (!std::isfinite(leaf.bounds.rate) && !is_flat(leaf.bounds, s.bounding_radius))
-      proofs.unrated_share += share;
+    if (!flat && !std::isfinite(cell.rate)) proofs.unrated_share += share;
   }
   proofs.convex = proofs.unproven_share == 0;
   proofs.seen_min = bounds.seen_min;
@@ -259,6 +263,9 @@ void measure(Draft& draft) {
   const KinkSummary kinks = measure_kinks(s.patches, s.links);
   s.smooth = std::max(kinks.convex, kinks.concave) <= kSmoothKink;
   if (kinks.gap > kJointRoundoff * s.bounding_radius) s.joint_slack = kGapsCrossed * kinks.gap;
+  s.ellipsoid = find_ellipsoid(s.patches, s.mass.inertia / s.mass.volume);
+  s.revolution = find_revolution(s.patches, s.ellipsoid, s.bounding_radius);
+  if (s.joint_slack == 0) s.meridian = make_meridian(s.patches, s.revolution, s.bounding_radius);
   SurfaceBounds bounds = bound_surface(s, is_sphere(s));
   if (is_sphere(s)) take_as_sphere(s, &bounds);
   const double rounding = least_rounding(s.patches);
@@ -273,9 +280,6 @@ void measure(Draft& draft) {
   s.rates = std::move(bounds.rates);
   s.joints = measure_joint_distance(s);
   s.normal_map = make_normal_map(s, &bounds);
-  s.ellipsoid = find_ellipsoid(s.patches, s.mass.inertia / s.mass.volume);
-  s.revolution = find_revolution(s.patches, s.ellipsoid, s.bounding_radius);
-  if (s.joint_slack == 0) s.meridian = make_meridian(s.patches, s.revolution, s.bounding_radius);
   s.profile_radii = make_profile_radii(s.meridian, s.patches, s.bounding_radius);
   s.atlas = make_atlas(s, kAtlasCells);
 }

@@ -170,10 +170,9 @@ auto multiplied(const Form<T>& f, const Form<S>& g, const Product& product) {
 struct Ball {
   Vec3 center = Vec3::Zero();
   double radius = 0;  // 0: none
-  double bent =
-      0;  // relative error of the curvatures, which positions up to round-off leave to a small patch
-  double tilt = 0;   // rad: the same of the normals
-  double width = 0;  // of the patch, length
+  double bent = 0;    // relative error that round-off of positions leaves to curvatures of a small patch ...
+  double tilt = 0;    // ... and to its normals, rad
+  double width = 0;   // of the patch, length
 };
 
 bool may_be_round(const BezierPatch& patch) {

@@ -693,5 +693,36 @@ TEST(Radii, of_a_narrow_rim) {
   }
 }
 
+// At the rim of a flat face the curvature about the axis falls to zero, which no cell shows: the profile
+// does.
+TEST(Dents, none_of_tablets_and_other_turned_bodies_with_flat_faces) {
+  for (const Surfaces& body :
+       {tablet(1, 0.6, 0.3), tablet(1, 0.8, 0.2), tablet(1e-6, 1e-6, 1e-7), tablet(1, 1, 1e-4),
+        revolve(rounded_profile({Vec2(0, -1), Vec2(0.8, -1), Vec2(1, 0.2), Vec2(0, 0.7)}, 0.02))}) {
+    const auto shape = make_shape("turned", body);
+    EXPECT_TRUE(proven_without_dents(*shape));
+  }
+}
+
+// A profile with a hollow, and one whose middle faces the axis, as deep as a file may have them.
+TEST(Dents, of_turned_bodies_are_not_overlooked) {
+  const double r = 1 - 5e-5;
+  for (const Surfaces& body : {revolve(Profile{{Vec2(0, -1), Vec2(0.4, -1), Vec2(0.8, -1), 0},
+                                               {Vec2(0.8, -1), Vec2(1, -1), Vec2(1, -0.8), std::sqrt(0.5)},
+                                               {Vec2(1, -0.8), Vec2(r, 0), Vec2(1, 0.8), 1},
+                                               {Vec2(1, 0.8), Vec2(1, 1), Vec2(0.8, 1), std::sqrt(0.5)},
+                                               {Vec2(0.8, 1), Vec2(0.4, 1), Vec2(0, 1), 0}}),
+                               revolve(Profile{{Vec2(0, -1 + 5e-5), Vec2(0.4, -1), Vec2(0.8, -1), 1},
+                                               {Vec2(0.8, -1), Vec2(1, -1), Vec2(1, -0.8), std::sqrt(0.5)},
+                                               {Vec2(1, -0.8), Vec2(1, 0), Vec2(1, 0.8), 0},
+                                               {Vec2(1, 0.8), Vec2(1, 1), Vec2(0.8, 1), std::sqrt(0.5)},
+                                               {Vec2(0.8, 1), Vec2(0.4, 1), Vec2(0, 1), 0}})}) {
+    const auto shape = make_shape("turned", body);
+    EXPECT_FALSE(shape->meridian.empty());
+    EXPECT_GT(shape->concavity, 1e-6);
+    EXPECT_FALSE(shape->proofs.convex);
+  }
+}
+
 }  // namespace
 }  // namespace nurbs
