@@ -639,10 +639,11 @@ class HullFitter {
     }
     double certified = 0;
     bool accepted = false;
+    const char* note = "";
     const auto accept = [&](const ConvexFit& found) {
       std::vector<NurbsSurface> body = cube.surfaces(found.points);
       transform(body, frame_.from, frame_.center);
-      const bool good = judge(std::move(body), kind);
+      const bool good = judge(std::move(body), kind, false, note);
       if (certified == 0) certified = judged_.worst();
       accepted = accepted || good;
       return good;
@@ -656,10 +657,12 @@ class HullFitter {
       if (!(strict.error < fit.error)) break;
       fit = std::move(strict);
       certified = 0;
+      note = ", asked to be nearer";
       good = accept(fit);
     }
     double& error = polynomial_error_[spans - 1];
     error = std::min(error, std::max(fit.error, certified));
+    note = ", asked to be rounder";
     if (good || fit.error <= tolerance_) raise_curvature(cube, fit, offset, free, accept);
     return accepted;
   }
@@ -724,7 +727,7 @@ class HullFitter {
         if (pass == 0) fall.add(spans, gauge_error_);
         if (fit.error > 1 / kAim) break;  // the certificate decides
         transform(fit.surfaces, frame_.from, frame_.center);
-        if (judge(std::move(fit.surfaces), kind)) return true;
+        if (judge(std::move(fit.surfaces), kind, false, pass > 0 ? ", asked to be nearer" : "")) return true;
         if (judged_.worst() <= tolerance_) return false;
         options.inward *= std::min(1.0, kAim * tolerance_ / judged_.inward);
         options.outward *= std::min(1.0, kAim * tolerance_ / judged_.outward);
@@ -764,8 +767,9 @@ class HullFitter {
 
   // Whether a body loads without a dent, is near enough and proven convex, with a ball that rolls inside:
   // keeps it then, and the first one for which that can't be proven, whose contacts are dear. `convex`: by
-  // construction.
-  bool judge(std::vector<NurbsSurface> surfaces, const std::string& kind, bool convex = false) {
+  // construction; `note`: how this trial of a kind differs from its first.
+  bool judge(std::vector<NurbsSurface> surfaces, const std::string& kind, bool convex = false,
+             const char* note = "") {
     HullFit now;
     now.surfaces = std::move(surfaces);
     now.radius = radius_;
@@ -775,24 +779,25 @@ class HullFitter {
     try {
       now.shape = make_shape("fit", now.surfaces, std::nullopt, &warnings);
     } catch (const ShapeError& error) {
-      say(kind + ": " + error.what());
+      say(kind + note + ": " + error.what());
       return false;
     }
     if (!warnings.empty() || now.shape->concavity > 1e-9 * radius_) {
-      say(kind + ": dented");
+      say(kind + note + ": dented");
       ++dents_;
       return false;
     }
     now.distance = judged_ = hull_distance(*now.shape, hull_, 0.01 * tolerance_);
     const double error = now.distance.worst() / radius_;
-    char radii[64];
-    std::snprintf(radii, sizeof radii, ", curvature radius up to %.3g",
-                  now.shape->patch_curvature.max_radius);
-    say(kind + ": within " + percent(error) + radii);
+    const CurvatureBounds& curvature = now.shape->patch_curvature;
+    const bool proven = (convex || now.shape->proofs.convex) && curvature.min_radius > 0;
+    char radii[96];
+    std::snprintf(radii, sizeof radii, ", curvature radius %.3g to %.3g of its radius",
+                  curvature.min_radius / radius_, curvature.max_radius / radius_);
+    say(kind + note + ": within " + percent(error) + radii + (proven ? "" : ", not proven convex"));
     least_ = std::min(least_, error);
     if (error > options_.tolerance) return false;
     if (std::abs(now.shape->mass.volume / mass_.volume - 1) > volume_error_) return false;
-    const bool proven = (convex || now.shape->proofs.convex) && now.shape->patch_curvature.min_radius > 0;
     if (proven || !best_.shape) best_ = std::move(now);
     return proven;
   }

@@ -334,6 +334,10 @@ class Fit(unittest.TestCase):
             said = self.fit(points, faces, "--tolerance", tolerance)
             counts.append(int(re.search(r"(\d+) control points in the file", said)[1]))
             self.assertIn("strictly convex", call("info", self.out).stdout)
+            tried = re.findall(r"radius (\S+) to (\S+) of its radius\n", said)
+            size = float(re.search(r"inward of its radius (\S+) ", said)[1])
+            found = [float(x) / size for x in re.search(r"; curvature radius (\S+) to (\S+)\n", said).groups()]
+            self.assertTrue(any(np.allclose(np.array(x, float), found, rtol=0.01) for x in tried), (tried, found))
         self.assertEqual(counts, sorted(counts))
         self.assertLessEqual(counts[0], 216)
         self.assertLessEqual(counts[-1], 384)
