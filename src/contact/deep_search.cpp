@@ -7,7 +7,7 @@
 
 #include "body/cube_map.h"
 #include "contact/direction_search.h"
-#include "contact/pair_memory.h"
+#include "contact/local_bend.h"
 #include "nurbs/wide.h"
 
 namespace nurbs {
@@ -24,8 +24,6 @@ constexpr int kMostCaps = 8;
 constexpr int kStretches = static_cast<int>(kStretchCaps.size()), kCaps = static_cast<int>(kInnerCaps.size());
 constexpr double kLeastCap = 0.012;  // rad: about the best minimum; less would leave thousands of cells
 constexpr double kWidestNearby = 0.4, kLeastNearby = 0.002, kNextNearby = 0.8;  // rad: caps by W alone
-constexpr double kMostOff = 1e-3;  // rad, between a normal and the direction
-constexpr double kOffNormal = 1e-6;
 constexpr double kFromThreshold = 0.25;  // of the tolerance, between the least p found and what is proven
 constexpr double kSlack = 0.02;          // of a stretch, given away for the tilt of its direction
 constexpr double kCapRoundoff = 1e-7;    // rad: angles are arc cosines
@@ -313,54 +311,21 @@ class DeepSearch {
   //     y >= y0 + s t + (m - y0) (1 - cos t) - rho t^3 / 6.
   Reach nearby(const JointSolution& s, double level, const Reach& start) const {
     const Vec3& d = s.bracket.direction;
-    const Vec3 t = d.unitOrthogonal();
-    const Curving a = curving(*pair_.a, pair_.scale_a, s.base_a, s.jet_a, d, t),
-                  b = curving(*pair_.b, pair_.scale_b, s.base_b, s.jet_b, -d, t);
+    const Vec3 t = d.unitOrthogonal(), u = d.cross(t);
+    const LocalBend a = local_bend(*pair_.a, pair_.scale_a, s.base_a, s.jet_a, d, t, u),
+                    b = local_bend(*pair_.b, pair_.scale_b, s.base_b, s.jet_b, -d, t, u);
     const double reach = std::min({a.reach, b.reach, kWidestNearby}), rate = a.rate + b.rate,
-                 m = least_of(a.turn + b.turn), y0 = start.y, falls = std::max(0.0, -start.slope),
+                 m = extremes(a.turn + b.turn).least, y0 = start.y, falls = std::max(0.0, -start.slope),
                  room = y0 - level - noise_;
     if (!(room > 0)) return {0, 0, 0};
     for (double to = reach; to >= kLeastNearby; to *= kNextNearby) {
       const double rise = m > y0 ? 1 - to * to / 12 : 1, bend = 0.5 * rise * (m - y0) - rate * to / 6;
-      const bool stays = bend > 0 && falls * falls <= 4 * bend * room;
-      if (!stays && !(room - falls * to + std::min(0.0, bend) * to * to >= 0)) continue;
+      if (!stays_above(room, falls, bend, to)) continue;
       const double c = std::cos(to), sine = std::sin(to);
       return {to, y0 * c + start.slope * sine + m * (1 - c) - rate * to * to * to / 6,
               (m - y0) * sine + start.slope * c - rate * to * to / 2};
     }
     return {0, 0, 0};
-  }
-
-  // W at a body's point, in the plane square to d spanned by t and d x t, less what the normal there is off
-  // d by; as far as `reach` it is no less than that less the rate times the angle. Reach 0: nothing is known.
-  struct Curving {
-    Mat2 turn = Mat2::Zero();
-    double rate = 0, reach = 0;
-  };
-  static double least_of(const Mat2& w) {
-    return 0.5 * w.trace() - std::hypot(0.5 * (w(0, 0) - w(1, 1)), w(0, 1));
-  }
-  static Curving curving(const Shape& shape, double scale, const SurfacePoint& at, const JetLanes& jet,
-                         const Vec3& outward, const Vec3& t) {
-    Curving c;
-    const LocalRate local = local_rate(shape, scale, at);
-    SupportModel model;
-    if (!make_support_model(Mat3::Identity(), Vec3::Zero(), jet, local, &model)) return c;
-    const Vec3 n = vec(model.normal), along = vec(model.tangent), across = n.cross(along),
-               s = outward.cross(t);
-    const double off = (n - outward).norm() * (1 + kOffNormal) + kPoleNormal;
-    if (!(off <= kMostOff)) return c;
-    const Vec2 x(t.dot(along), s.dot(along)), y(t.dot(across), s.dot(across));
-    const Mat2 mixed = x * y.transpose();
-    c.turn =
-        model.w0 * x * x.transpose() + model.w1 * (mixed + mixed.transpose()) + model.w2 * y * y.transpose();
-    const double most = c.turn.trace();
-    c.turn -= 2 * off * (most + local.rate) * Mat2::Identity();
-    c.rate = local.rate;
-    // The point goes no further than most t + rate t^2 / 2.
-    c.reach =
-        2 * local.room / (most + std::sqrt(most * most + 2 * c.rate * local.room)) * (1 - kOffNormal) - off;
-    return c;
   }
 
   // Least eigenvalue of W_A + W_B within `angle` of d. For a unit v square to a direction there, v = cos e u

@@ -6,7 +6,7 @@
 
 #include "body/cube_map.h"
 #include "contact/growing_hull.h"
-#include "contact/pair_memory.h"
+#include "contact/local_bend.h"
 #include "contact/ring_search.h"
 #include "contact/support_turn.h"
 
@@ -32,21 +32,10 @@ struct Cap {
   int vertex, from;     // the minimum's own
 };
 
-// Eigenvalues of a symmetric matrix.
-struct Extremes {
-  double least, most;
-};
-Extremes extremes(const Mat2& m) {
-  const double mean = 0.5 * m.trace(), spread = std::hypot(0.5 * (m(0, 0) - m(1, 1)), m(0, 1));
-  return {mean - spread, mean + spread};
-}
-
-// What is known of a body's inverse Weingarten maps W about a direction d: the support's, in a frame of d's
-// tangent plane, less `rate` times the angle from d up to `reach`, and balls.
+// What is known of a body's inverse Weingarten maps W about a direction: from the support's, and balls.
 struct Bend {
-  Mat2 turn = Mat2::Zero();
-  double least = 0, most = 0;  // its eigenvalues
-  double rate = 0, reach = 0;
+  LocalBend local;
+  double least = 0;                                           // eigenvalue of its turn
   std::array<double, kInnerCaps.size()> ball{}, within{};     // radius for directions within an angle of d
   std::array<double, kStretchCaps.size()> stretch{}, near{};  // the same from finer cells
 };
@@ -61,7 +50,7 @@ constexpr double kFlatBend = 1e-3;        // of the overlap, of its bend along a
 constexpr double kCapDepth = 0.4;         // of the tolerance, that a cap proves less than the least overlap
 constexpr double kCapUsed = 0.8;          // of a cap's angle: the rest is for lower minima found later
 constexpr double kWidestCap = 0.42, kLeastCap = 1e-4, kNextCap = 0.75;  // rad
-constexpr double kOffNormal = 1e-6;  // rad: a support's normal further from its direction is no W of it
+constexpr double kOffNormal = 1e-6;                                     // rad, given away for round-off
 // A cap whose bodies are cut to their cores about it, below.
 constexpr double kOffSupport = 1e-4;  // rad
 constexpr int kBeforeCores = 96;      // points before that is tried ...
@@ -357,8 +346,7 @@ class Search {
       const double rise = m > y0 ? (1 - to * to / 12) : 1, falls = slope + std::sqrt(2 * over * m),
                    bend = 0.5 * rise * (m - y0) - rate * to / 6, room = y0 - level;
       if (!(room > 0)) break;
-      const bool stays = bend > 0 && falls * falls <= 4 * bend * room;
-      if (!stays && !(room - falls * to + std::min(0.0, bend) * to * to >= 0)) continue;
+      if (!stays_above(room, falls, bend, to)) continue;
       angle = to;
       break;
     }
@@ -454,27 +442,11 @@ class Search {
         bend.near[k] = kStretchCaps[k] - beside - kOffNormal;
       }
     }
-    const LocalRate local = local_rate(shape, scale, at);
     JetLanes jet;
     evaluate2(shape.patches[at.patch], at.u, at.v, &jet);
     nurbs::scale(scale, &jet);
-    SupportModel model;
-    if (!make_support_model(Mat3::Identity(), Vec3::Zero(), jet, local, &model)) return bend;
-    const Vec3 n = vec(model.normal), along = vec(model.tangent), across = n.cross(along);
-    if (!((n - d).squaredNorm() <= kOffNormal * kOffNormal)) return bend;
-    const Vec2 x(t.dot(along), s.dot(along)), y(t.dot(across), s.dot(across));
-    const Mat2 mixed = x * y.transpose();
-    bend.turn =
-        model.w0 * x * x.transpose() + model.w1 * (mixed + mixed.transpose()) + model.w2 * y * y.transpose();
-    const Extremes seen = extremes(bend.turn);
-    bend.rate = local.rate;
-    bend.most = seen.most;
-    // What the frames' and the normal's errors may hide.
-    bend.least = seen.least - kOffNormal * (bend.most + bend.rate);
-    bend.turn -= kOffNormal * (bend.most + bend.rate) * Mat2::Identity();
-    // The point goes no further than most t + rate t^2 / 2.
-    bend.reach = local.room / (bend.most + std::sqrt(bend.most * bend.most + 2 * bend.rate * local.room)) *
-                 2 * (1 - kOffNormal);
+    bend.local = local_bend(shape, scale, at, jet, d, t, s);
+    bend.least = extremes(bend.local.turn).least;
     return bend;
   }
 
@@ -492,9 +464,9 @@ class Search {
       if (to <= bend.within[k]) ball = std::max(ball, bend.ball[k]);
     for (std::size_t k = 0; k < kStretchCaps.size(); ++k)
       if (to <= bend.near[k]) ball = std::max(ball, bend.stretch[k]);
-    if (to <= bend.reach && bend.least - bend.rate * to > ball) {
-      *rate += bend.rate;
-      return bend.turn;
+    if (to <= bend.local.reach && bend.least - bend.local.rate * to > ball) {
+      *rate += bend.local.rate;
+      return bend.local.turn;
     }
     return ball * Mat2::Identity();
   }

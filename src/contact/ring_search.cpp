@@ -282,11 +282,11 @@ class RingSearch {
     return true;
   }
 
-  // Circles are numbered by the angle they were asked for. Chosen are those asked for in a sector, and some
+  // Circles are kept by the angle they were asked for. Chosen are those asked for in a sector, and some
   // on either side, of a mate's points some that were asked for at azimuths near the sector's.
   void choose(const Sector& sector, double half) {
-    const auto before = [&](int i, const Angle& a) { return cross(circle_[i].at, a) > 0; };
-    const int *const begin = order_, *const end = order_ + count_;
+    const auto before = [](const Circle& c, const Angle& a) { return cross(c.at, a) > 0; };
+    const Circle *const begin = circle_, *const end = circle_ + count_;
     const auto first = static_cast<int>(std::lower_bound(begin, end, sector.low, before) - begin),
                last = static_cast<int>(std::lower_bound(begin, end, sector.high, before) - begin);
     const double reach = std::max(kNearAzimuth, 2 * half);
@@ -297,22 +297,21 @@ class RingSearch {
     };
     chosen_ = 0;
     for (int i = first - 1, beside = 0; i >= 0 && beside < kBeside; --i) {
-      const bool counts = near(circle_[order_[i]]);
-      if (counts || first - i <= kBeside) which_[chosen_++] = order_[i];
+      const bool counts = near(circle_[i]);
+      if (counts || first - i <= kBeside) which_[chosen_++] = i;
       beside += counts;
     }
-    for (int i = first; i < last; ++i) which_[chosen_++] = order_[i];
+    for (int i = first; i < last; ++i) which_[chosen_++] = i;
     for (int i = last, beside = 0; i < count_ && beside < kBeside; ++i) {
-      const bool counts = near(circle_[order_[i]]);
-      if (counts || i - last < kBeside) which_[chosen_++] = order_[i];
+      const bool counts = near(circle_[i]);
+      if (counts || i - last < kBeside) which_[chosen_++] = i;
       beside += counts;
     }
   }
   void insert(const Circle& c) {
-    int at = count_;
-    for (; at > 0 && cross(c.at, circle_[order_[at - 1]].at) > 0; --at) order_[at] = order_[at - 1];
-    order_[at] = count_;
-    circle_[count_++] = c;
+    int at = count_++;
+    for (; at > 0 && cross(c.at, circle_[at - 1].at) > 0; --at) circle_[at] = circle_[at - 1];
+    circle_[at] = c;
   }
 
   // Over the angles of a sector.
@@ -628,7 +627,6 @@ class RingSearch {
   SurfacePoint on_k_, on_m_, last_k_, last_m_;
   int count_ = 0, queries_ = 0;
   Circle circle_[kMostCircles];
-  int order_[kMostCircles];
   int chosen_ = 0, which_[kMostCircles];
   Meridian meridian_[kMostCircles];  // of the chosen
 };

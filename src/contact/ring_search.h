@@ -19,8 +19,7 @@ namespace nurbs {
 // the axes are apart, or two circles are weighed to second order, in which what they change by cancels at the
 // minimum; intervals, and those of angles from the axis, are halved until that is little enough. No surface
 // is evaluated for it but where a new circle is needed. Between two circles a body bends as its meridian does
-// (body/profile_radii.h). A ball is of
-// revolution about any axis: K's is taken.
+// (body/profile_radii.h). A ball is of revolution about any axis: K's is taken.
 bool search_rings(const PairFrame& pair, double tolerance, bool last, PolytopeResult* result);
 
 }  // namespace nurbs

@@ -12,6 +12,7 @@
 #include "contact/deep_search.h"
 #include "contact/pair_search.h"
 #include "contact/polytope.h"
+#include "nurbs/affine.h"
 #include "shapes/random_pebble.h"
 #include "shapes/revolved.h"
 #include "support/bodies.h"
@@ -266,6 +267,35 @@ TEST(DeepSearch, a_local_minimum_is_not_taken_for_the_least) {
     EXPECT_GT(std::abs(s.normal[2]), 0.8);
   }
   EXPECT_GT(found, 5);
+}
+
+// At d two bodies bend far more one way than the other, both the same way, and p has a saddle with two lower
+// minima beside it. Bends are summed in one frame: crossed by mistake they would make it a minimum.
+TEST(DeepSearch, a_saddle_is_not_taken_for_a_minimum) {
+  Random random(81);
+  int proven = 0;
+  for (int k = 0; k < 120; ++k) {
+    const double b = k % 2 ? 0.8 : 0.5, c = 0.4;
+    const Mat3 turn = random.turn().toRotationMatrix();
+    std::vector<NurbsSurface> surfaces = exact_ellipsoid(Vec3(1, b, c));
+    transform(surfaces, turn, Vec3(Vec3::Zero()));
+    const ShapePointer shape = make_shape("ellipsoid", surfaces);
+    Pair p;
+    p.a.shape = p.b.shape = shape.get();
+    const Vec3 d = turn.col(1);
+    p.b.x = (2 - random.log_uniform(0.02, 0.5)) * (b - c * c / b) * d;
+    const PairFrame pair(p.a, p.b);
+    const double tolerance = 1e-9 * pair.size;
+    JointSolution s = solve_joint(pair, find_hull_support(*shape, d).where,
+                                  find_hull_support(*shape, -d).where, tolerance, kFarAway, 20);
+    if (!search_deep(pair, tolerance, &s)) continue;
+    ++proven;
+    const double least = -s.bracket.upper, noise = 1e-14 * pair.reach;
+    for (double angle = 0; angle < M_PI / 2; angle += 2e-3)
+      ASSERT_GE(overlap_along(p.a, p.b, std::cos(angle) * d + std::sin(angle) * turn.col(2)), least - noise)
+          << k << " " << angle;
+  }
+  EXPECT_GT(proven, 5);
 }
 
 // Follows a pair with and without memory; how many steps were answered by a proof of an earlier one.
