@@ -148,42 +148,6 @@ Jet evaluate(const Row& b, int n, double t) {
   return quadratic(c[0], c[1], c[2]);
 }
 
-// --- what it proves
-
-// `outward`: of the patch that it sweeps, at the middle of both, in the profile's plane.
-bool bulges(const Meridian::Piece& piece, const Vec2& outward, double size) {
-  Bernstein<Vec3> p;
-  Bernstein<double> z, w;
-  for (int i = 0; i <= piece.degree; ++i) {
-    if (!(piece.r[i] >= -kRoundoff * size)) return false;
-    p.emplace_back(piece.r[i] / size, piece.z[i] / size, piece.w[i]);
-    z.push_back(p[i][1]);
-    w.push_back(p[i][2]);
-  }
-  const auto by = [](double a, double b) { return a * b; };
-  const Bernstein<Vec3> first = derivative(p), second = derivative(first);
-  // Numerators of the height's slope and of the curve's turn.
-  const Bernstein<double> rise = nurbs::difference(multiply(derivative(z), w, by),
-                                                   multiply(z, derivative(w), by)),
-                          bend = multiply(
-                              multiply(p, first,
-                                       [](const Vec3&a, const Vec3&b) -> Vec3 { return a.cross(b); }),
-                              second, [](const Vec3&a, const Vec3&b) { return a.dot(b); });
-  const auto longest = [](const Bernstein<Vec3>& row) {
-    double most = 0;
-    for (const Vec3& x : row) most = std::max(most, x.norm());
-    return most;
-  };
-  const double noise = kRoundoff * longest(p) * longest(first);
-  const Jet r = evaluate(piece.r, piece.degree, 0.5), h = evaluate(piece.z, piece.degree, 0.5),
-            v = evaluate(piece.w, piece.degree, 0.5);
-  const double side =
-      outward[0] * (h.f1 * v.f - h.f * v.f1) - outward[1] * (r.f1 * v.f - r.f * v.f1) > 0 ? 1 : -1;
-  return std::all_of(rise.begin(), rise.end(), [&](double x) { return side * x >= -noise; }) &&
-         std::all_of(bend.begin(), bend.end(),
-                     [&](double x) { return side * x >= -noise * longest(second); });
-}
-
 // --- the support of the profile
 
 // Part of a piece: coefficients of f = dr r + dz z - level w, and of w.
@@ -448,19 +412,6 @@ Meridian make_meridian(const std::vector<BezierPatch>& patches, const Revolution
     m.starts.push_back(best);
   }
   return m;
-}
-
-std::vector<bool> bulging_patches(const Meridian& m, const std::vector<BezierPatch>& patches, double size) {
-  std::vector<bool> bulging(patches.size(), false);
-  for (const Meridian::Piece& piece : m.pieces)
-    for (int k = piece.first_sector; k < piece.first_sector + piece.sectors; ++k) {
-      const int patch = m.sectors[k].patch;
-      const Jet1 middle = evaluate1(patches[patch], 0.5, 0.5);
-      const Vec3 at = m.axes * (middle.s - m.point), n = m.axes * middle.su.cross(middle.sv).normalized();
-      const Vec2 outward(n.head<2>().dot(at.head<2>().normalized()), n[2]);
-      bulging[patch] = bulges(piece, outward, size);
-    }
-  return bulging;
 }
 
 bool find_meridian_support(const Meridian& m, const Vec3& d, double size, const SurfacePoint* start,

@@ -48,12 +48,6 @@ struct Meridian {
 // to the axis need not be such products: the rest bounds them.
 Meridian make_meridian(const std::vector<BezierPatch>& patches, const Revolution& revolution, double size);
 
-// Per patch: whether a piece of the profile sweeps it that turns one way only, outward, and never faces the
-// axis. No curvature of such a patch is negative, up to round-off: one is the profile's, the other how much
-// the normal points away from the axis over the distance from it. Where that goes to zero, at the rim of a
-// flat face, enclosures never show it. Proven from Bernstein coefficients.
-std::vector<bool> bulging_patches(const Meridian& m, const std::vector<BezierPatch>& patches, double size);
-
 struct MeridianSupport {
   SurfacePoint where;
   double upper;  // of the support function

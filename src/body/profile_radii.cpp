@@ -1,5 +1,4 @@
-// See profile_radii.h. Of a rational curve (R, Z) / w, with C = (R, Z, w): the velocity is N / w^2, N = (R'w
-// - R w', Z'w - Z w'), and its curvature radius |N|^3 / (w^3 det(C, C', C'')).
+// See profile_radii.h.
 #include "body/profile_radii.h"
 
 #include <algorithm>
@@ -7,7 +6,7 @@
 #include <tuple>
 #include <utility>
 
-#include "nurbs/bernstein.h"
+#include "body/profile_turn.h"
 #include "nurbs/tolerances.h"
 
 namespace nurbs {
@@ -28,6 +27,18 @@ using Rows = Bernstein<Vec2>;
 double place_of(const Vec2& n) {
   if (!(n[0] > 0)) return n[1] > 0 ? 1 : 0;
   return 0.5 * (1 + n[1] / (n[0] + std::abs(n[1])));
+}
+
+// Between two places, and what round-off may add.
+struct Cells {
+  int first, last;
+};
+Cells cells_of(double from, double to) {
+  const auto cell = [](double place) {
+    return std::clamp(static_cast<int>(std::floor(place)), 0, kProfileCells - 1);
+  };
+  return {cell(std::min(from, to) * kProfileCells - kBesideCell),
+          cell(std::max(from, to) * kProfileCells + kBesideCell)};
 }
 
 double largest(const Row& row) {
@@ -56,35 +67,15 @@ class Painter {
   explicit Painter(double size) : size_(size), cell_(kProfileCells, kFarAway) {}
 
   // Paints a piece; false where its normals cannot be told.
-  bool paint(const Meridian::Piece& piece, const Vec2& outward) {
-    Bernstein<Vec3> c;
-    Row r, z, w;
-    for (int i = 0; i <= piece.degree; ++i) {
-      c.emplace_back(piece.r[i] / size_, piece.z[i] / size_, piece.w[i]);
-      r.push_back(c[i][0]);
-      z.push_back(c[i][1]);
-      w.push_back(c[i][2]);
-    }
-    const auto by = [](double a, double b) { return a * b; };
-    const Row nr = difference(multiply(derivative(r), w, by), multiply(r, derivative(w), by)),
-              nz = difference(multiply(derivative(z), w, by), multiply(z, derivative(w), by));
-    const Bernstein<Vec3> first = derivative(c), second = derivative(first);
-    Leaf leaf;
-    for (size_t i = 0; i < nr.size(); ++i) leaf.n.emplace_back(nr[i], nz[i]);
-    leaf.det = multiply(multiply(c, first, [](const Vec3& a, const Vec3& b) -> Vec3 { return a.cross(b); }),
-                        second, [](const Vec3& a, const Vec3& b) { return a.dot(b); });
-    leaf.w = w;
-    double most = 0, most1 = 0, most2 = 0;
-    for (const Vec3& x : c) most = std::max(most, x.norm());
-    for (const Vec3& x : first) most1 = std::max(most1, x.norm());
-    for (const Vec3& x : second) most2 = std::max(most2, x.norm());
-    noise_n_ = kRoundoff * most * most1;
-    noise_det_ = kRoundoff * most * most1 * most2;
-    const Vec2 middle = middle_of(leaf.n);
-    side_ = square_to(middle, 1).dot(outward) > 0 ? 1 : -1;
-    add_end(r.front() / w.front(), z.front() / w.front(), end_of(leaf.n.begin(), leaf.n.end()));
-    add_end(r.back() / w.back(), z.back() / w.back(), end_of(leaf.n.rbegin(), leaf.n.rend()));
-    return examine(std::move(leaf), kMostDepth);
+  bool paint(const Meridian::Piece& piece, ProfileTurn turn) {
+    noise_n_ = turn.velocity_noise;
+    noise_det_ = turn.det_noise;
+    side_ = turn.side;
+    const auto at = [&](int i) { return Vec2(Vec2(piece.r[i], piece.z[i]) / (size_ * piece.w[i])); };
+    const Rows& n = turn.velocity;
+    add_end(at(0), end_of(n.begin(), n.end()));
+    add_end(at(piece.degree), end_of(n.rbegin(), n.rend()));
+    return examine({std::move(turn.velocity), std::move(turn.det), std::move(turn.weight)}, kMostDepth);
   }
 
   // The fans of normals at kinks, where the radius is 0. Ends without another meet the axis, or the rim of a
@@ -125,8 +116,8 @@ class Painter {
     Vec2 at, normal;
   };
 
-  void add_end(double r, double z, const Vec2& velocity) {
-    ends_.push_back({Vec2(r, z), square_to(velocity, side_).normalized()});
+  void add_end(const Vec2& at, const Vec2& velocity) {
+    ends_.push_back({at, square_to(velocity, side_).normalized()});
   }
   // The first velocity that is one.
   template <class Iterator>
@@ -145,11 +136,8 @@ class Painter {
       put(place_of(a), place_of(b), 0);
   }
   void put(double from, double to, double radius) {
-    if (from > to) std::swap(from, to);
-    const int first = std::max(0, static_cast<int>(std::floor(from * kProfileCells - kBesideCell))),
-              last =
-                  std::min(kProfileCells - 1, static_cast<int>(std::floor(to * kProfileCells + kBesideCell)));
-    for (int k = first; k <= last; ++k) cell_[k] = std::min(cell_[k], radius);
+    const Cells cells = cells_of(from, to);
+    for (int k = cells.first; k <= cells.last; ++k) cell_[k] = std::min(cell_[k], radius);
   }
 
   bool examine(Leaf leaf, int depth) {
@@ -210,23 +198,17 @@ double ProfileRadii::within(double cosine, double sine, double reach) const {
   const double c = std::cos(reach), s = std::sin(reach);
   const Vec2 low(sine * c - cosine * s, cosine * c + sine * s),
       high(sine * c + cosine * s, cosine * c - sine * s);
-  const double from = std::min(place_of(low), place_of(high)), to = std::max(place_of(low), place_of(high));
-  const int first = std::max(0, static_cast<int>(std::floor(from * kProfileCells - kBesideCell))),
-            last =
-                std::min(kProfileCells - 1, static_cast<int>(std::floor(to * kProfileCells + kBesideCell)));
-  float radius = least[first];
-  for (int k = first + 1; k <= last; ++k) radius = std::min(radius, least[k]);
+  const Cells cells = cells_of(place_of(low), place_of(high));
+  float radius = least[cells.first];
+  for (int k = cells.first + 1; k <= cells.last; ++k) radius = std::min(radius, least[k]);
   return radius;
 }
 
 ProfileRadii make_profile_radii(const Meridian& m, const std::vector<BezierPatch>& patches, double size) {
   if (m.empty()) return {};
   Painter painter(size);
-  for (const Meridian::Piece& piece : m.pieces) {
-    const Jet1 middle = evaluate1(patches[m.sectors[piece.first_sector].patch], 0.5, 0.5);
-    const Vec3 at = m.axes * (middle.s - m.point), n = m.axes * middle.su.cross(middle.sv);
-    if (!painter.paint(piece, Vec2(n.head<2>().dot(at.head<2>().normalized()), n[2]))) return {};
-  }
+  for (const Meridian::Piece& piece : m.pieces)
+    if (!painter.paint(piece, profile_turn(m, piece, patches, size))) return {};
   if (!painter.paint_kinks()) return {};
   return {painter.radii()};
 }

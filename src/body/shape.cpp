@@ -9,6 +9,7 @@
 #include "body/connectivity.h"
 #include "body/convexity.h"
 #include "body/mass_properties.h"
+#include "body/profile_turn.h"
 #include "body/rounding.h"
 #include "body/surface_bounds.h"
 #include "nurbs/tolerances.h"

@@ -317,11 +317,11 @@ constexpr int kSplitAtOnce = 16;  // leaves whose halves are enclosed side by si
 // A leaf to be halved, of which patch; `ball` may be null.
 struct Splitting {
   const BezierPatch* patch;
-  const Leaf* leaf;
   Wanted wanted;
   const Ball* ball;
-  bool in_u;
-  Halves* to;
+  const Leaf* leaf = nullptr;
+  bool in_u = false;
+  Halves* to = nullptr;
 };
 
 void halve_all(const std::vector<Splitting>& all, int* cells) {
@@ -369,6 +369,47 @@ void split_all(const std::vector<Splitting>& all, int* cells) {
     const bool neither = std::min(doubt(*s.to), doubt(other)) >= leaf.bounds.doubt;
     const bool turn = neither ? (leaf.cell.du >= leaf.cell.dv) != s.in_u : doubt(other) < doubt(*s.to);
     if (turn) std::swap(*s.to, other);
+  }
+}
+
+// Halves leaves that `wants`, level by level, while `cells` is below `most`; `in` says where and how a leaf
+// is (but for which way), `see` sees each half before its leaf is replaced.
+template <class Wants, class In, class See>
+void halve_leaves(const Wants& wants, const In& in, const See& see, int most, std::vector<Leaf>* leaves,
+                  int* cells) {
+  std::vector<int> level(leaves->size()), next, chosen;
+  std::iota(level.begin(), level.end(), 0);
+  std::vector<Splitting> splittings;
+  std::array<Halves, kSplitAtOnce> halves;
+  while (!level.empty() && *cells < most) {
+    next.clear();
+    for (size_t at = 0; at < level.size();) {
+      splittings.clear();
+      chosen.clear();
+      for (; at < level.size() && static_cast<int>(chosen.size()) < kSplitAtOnce; ++at) {
+        const Leaf& leaf = (*leaves)[level[at]];
+        if (*cells + 2 * static_cast<int>(chosen.size()) >= most || !wants(leaf)) continue;
+        Splitting s = in(leaf);
+        s.leaf = &leaf;
+        s.in_u = leaf.bounds.split_u;
+        s.to = &halves[chosen.size()];
+        splittings.push_back(s);
+        chosen.push_back(level[at]);
+      }
+      split_all(splittings, cells);
+      for (size_t k = 0; k < chosen.size(); ++k) {
+        auto& [a, b] = halves[k];
+        see(a);
+        see(b);
+        Leaf& leaf = (*leaves)[chosen[k]];
+        a.depth = b.depth = leaf.depth + 1;
+        leaf = a;
+        next.push_back(chosen[k]);
+        next.push_back(static_cast<int>(leaves->size()));
+        leaves->push_back(b);
+      }
+    }
+    level.swap(next);
   }
 }
 
@@ -512,37 +553,12 @@ class Bounder {
   // What is not loose stays so, as what is seen can only move the aims outward: leaves are looked at once.
   template <class Loose>
   void halve_while(const Loose& loose, int most_cells) {
-    std::vector<int> level(out_.leaves.size()), next;
-    std::iota(level.begin(), level.end(), 0);
-    while (!level.empty() && out_.cells < most_cells) {
-      next.clear();
-      for (size_t at = 0; at < level.size();) {
-        splittings_.clear();
-        chosen_.clear();
-        for (; at < level.size() && static_cast<int>(chosen_.size()) < kSplitAtOnce; ++at) {
-          const Leaf& leaf = out_.leaves[level[at]];
-          const int spent = out_.cells + 2 * static_cast<int>(chosen_.size());
-          if (spent >= most_cells || leaf.depth >= kDeepestCell || !loose(leaf)) continue;
-          const Cell& c = leaf.cell;
-          splittings_.push_back({&out_.even[c.patch], &leaf, wanted(c), &balls_[c.patch], leaf.bounds.split_u,
-                                 &halves_[chosen_.size()]});
-          chosen_.push_back(level[at]);
-        }
-        split_all(splittings_, &out_.cells);
-        for (size_t k = 0; k < chosen_.size(); ++k) {
-          auto& [a, b] = halves_[k];
-          see(a);
-          see(b);
-          Leaf& leaf = out_.leaves[chosen_[k]];
-          a.depth = b.depth = leaf.depth + 1;
-          leaf = a;
-          next.push_back(chosen_[k]);
-          next.push_back(static_cast<int>(out_.leaves.size()));
-          out_.leaves.push_back(b);
-        }
-      }
-      level.swap(next);
-    }
+    halve_leaves([&](const Leaf& leaf) { return leaf.depth < kDeepestCell && loose(leaf); },
+                 [this](const Leaf& leaf) {
+                   const Cell& c = leaf.cell;
+                   return Splitting{&out_.even[c.patch], wanted(c), &balls_[c.patch]};
+                 },
+                 [this](const Leaf& half) { see(half); }, most_cells, &out_.leaves, &out_.cells);
   }
 
   // The least radius first: with none at all no ball rolls inside, and every answer is dear.
@@ -630,9 +646,6 @@ class Bounder {
   const int patches_;
   bool with_rates_ = false, sphere_ = false, hollow_ = false;
   std::vector<std::pair<Change, Change>> changes_;
-  std::vector<Splitting> splittings_;  // of halve_while
-  std::vector<int> chosen_;
-  std::array<Halves, kSplitAtOnce> halves_;
   std::vector<double> seen_rate_;
   std::vector<Ball> balls_;
   SurfaceBounds out_;
@@ -666,36 +679,12 @@ namespace {
 // Halves leaves while they are loose and `spent` is below `cells`.
 template <class Loose>
 void refine(const Loose& loose, int cells, Wanted wanted, int* spent, SurfaceBounds* bounds) {
-  std::vector<Leaf>& leaves = bounds->leaves;
-  std::vector<int> level(leaves.size()), next, chosen;
-  std::iota(level.begin(), level.end(), 0);
-  std::vector<Splitting> splittings;
-  std::vector<Halves> halves(kSplitAtOnce);
-  while (!level.empty()) {
-    next.clear();
-    for (size_t at = 0; at < level.size();) {
-      splittings.clear();
-      chosen.clear();
-      for (; at < level.size() && static_cast<int>(chosen.size()) < kSplitAtOnce; ++at) {
-        const Leaf& leaf = leaves[level[at]];
-        const Cell& c = leaf.cell;
-        if (*spent + 2 * static_cast<int>(chosen.size()) >= cells || !loose(leaf.bounds) ||
-            c.du * c.dv < kLeastNormalCell)
-          continue;
-        splittings.push_back(
-            {&bounds->even[c.patch], &leaf, wanted, nullptr, leaf.bounds.split_u, &halves[chosen.size()]});
-        chosen.push_back(level[at]);
-      }
-      split_all(splittings, spent);
-      for (size_t k = 0; k < chosen.size(); ++k) {
-        leaves[chosen[k]] = halves[k].first;
-        next.push_back(chosen[k]);
-        next.push_back(static_cast<int>(leaves.size()));
-        leaves.push_back(halves[k].second);
-      }
-    }
-    level.swap(next);
-  }
+  halve_leaves(
+      [&](const Leaf& leaf) { return loose(leaf.bounds) && leaf.cell.du * leaf.cell.dv >= kLeastNormalCell; },
+      [&](const Leaf& leaf) {
+        return Splitting{&bounds->even[leaf.cell.patch], wanted, nullptr};
+      },
+      [](const Leaf&) {}, cells, &bounds->leaves, spent);
 }
 
 }  // namespace
