@@ -19,8 +19,10 @@ enum class Pose {
   centred,   // nearly on one centre, axes nearly parallel or not at all
   features,  // faces, vertices and rims of one against those of the other
   sizes,     // 1e2 to 1e6 : 1, at the larger body's surface or inside it
+  saddles,   // stationary along a direction, about as deep as where it turns from a minimum to a saddle; one
+             // time in two twins that are equally turned, or nearly, or mirrored
 };
-constexpr int kPoses = 5;
+constexpr int kPoses = 6;
 extern const char* const kPoseNames[kPoses];
 
 struct Body {
