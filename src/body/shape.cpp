@@ -278,6 +278,7 @@ void measure(Draft& draft) {
   judge_dent(draft, dent);
   s.concavity = dent.depth;
   s.support_excess = dent.excess + s.joint_slack;
+  s.core = find_sphero_polyhedron(s);
   s.rates = std::move(bounds.rates);
   s.joints = measure_joint_distance(s);
   s.normal_map = make_normal_map(s, &bounds);

@@ -19,6 +19,7 @@
 #include "body/normal_map.h"
 #include "body/profile_radii.h"
 #include "body/revolution.h"
+#include "body/sphero_polyhedron.h"
 #include "body/rolling.h"
 #include "nurbs/bezier_patch.h"
 #include "nurbs/nurbs_surface.h"
@@ -132,6 +133,7 @@ struct Shape {
   Revolution revolution;       // about an axis, if the body is one
   Meridian meridian;           // whose profile this is; empty for other bodies
   ProfileRadii profile_radii;  // of that
+  SpheroPolyhedron core;       // hull of points, and a ball, that the body is, if it is one
   FlatFeatures flats;          // faces, creases and ruled lines; empty for round bodies
 
   // Balls inside the body over directions.

@@ -34,6 +34,12 @@ struct PairFrame {
     return inner_maps ? shape.inner_map() : none;
   }
 
+  // Whether points and balls stand for both, to little more than round-off of the tolerance.
+  bool both_sphero_polyhedra(double tolerance) const {
+    return a->core.found() && b->core.found() &&
+           scale_a * a->core.error + scale_b * b->core.error <= kCoreError * tolerance;
+  }
+
   Vec3 place_a(const Vec3& s) const { return scale_a * s; }
   Vec3 place_b(const Vec3& s) const { return offset + scale_b * (turn * s); }
   Vec3 direction_on_b(const Vec3& d) const {

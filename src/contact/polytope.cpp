@@ -67,6 +67,16 @@ class Search {
  public:
   Search(const PairFrame& pair, double tolerance, double joggle)
       : pair_(pair), tolerance_(tolerance), joggle_(joggle), hull_(kSliver * pair.reach) {
+    if (pair.both_sphero_polyhedra(tolerance)) {
+      // Nothing but points is left: the hull is their difference's, as exact as they are.
+      core_a_ = &pair.a->core;
+      core_b_ = &pair.b->core;
+      shrink_a_ = pair.scale_a * core_a_->radius;
+      shrink_b_ = pair.scale_b * core_b_->radius;
+      shrink_ = shrink_a_ + shrink_b_;
+      core_error_ = pair.scale_a * core_a_->error + pair.scale_b * core_b_->error;
+      return;
+    }
     // No ball that rolls inside is larger than the largest inside (a sphere's radii are bounds of it).
     shrink_a_ = pair.scale_a * std::min(pair.a->curvature.min_radius, pair.a->inner_radius);
     shrink_b_ = pair.scale_b * std::min(pair.b->curvature.min_radius, pair.b->inner_radius);
@@ -174,7 +184,7 @@ class Search {
         stalled_ = true;
         return;
       }
-      if (hull_.points() >= before_cores_) {
+      if (!core_a_ && hull_.points() >= before_cores_) {
         before_cores_ = hull_.points() + kBetweenCores;
         cover_by_cores();
       }
@@ -209,6 +219,10 @@ class Search {
     r.points.b = b - shrink_b_ * direction_;
     r.points.on_a = w.on_a;
     r.points.on_b = w.on_b;
+    if (core_a_) {
+      r.points.on_a = find_hull_support(*pair_.a, direction_).where;
+      r.points.on_b = find_hull_support(*pair_.b, pair_.direction_on_b(direction_)).where;
+    }
     const double apart = direction_.dot(r.points.b - r.points.a);
     // Where the bracket stayed open, the least overlap seen: the hull errs to first order, the direction to
     // second.
@@ -220,7 +234,7 @@ class Search {
   }
 
  private:
-  double roundoff() const { return kRoundoff * pair_.reach + 2 * joggle_; }
+  double roundoff() const { return kRoundoff * pair_.reach + 2 * joggle_ + core_error_; }
   // A point less high above a face than this is not worth adding: the bracket is as good as closed there.
   double least_height() const { return std::max(0.25 * roundoff(), kLeastHeight * tolerance_); }
 
@@ -230,6 +244,7 @@ class Search {
     const int v = hull_.points();
     if (v == kHullVertices) return -1;
     witness_[v].cap = false;
+    if (core_a_) return query_cores(d, v);
     const auto [sa, sb] = hull_supports(pair_, d, near < 0 ? nullptr : &witness_[near].on_a,
                                         near < 0 ? nullptr : &witness_[near].on_b, tolerance_);
     Witness& w = witness_[v];
@@ -239,7 +254,24 @@ class Search {
     w.d = d;
     w.on_a = sa.where;
     w.on_b = sb.where;
-    const double p = pair_.overlap_along(d, sa.upper, sb.upper);
+    return take(v, pair_.overlap_along(d, sa.upper, sb.upper));
+  }
+
+  // The same of two sphero-polyhedra.
+  int query_cores(const Vec3& d, int v) {
+    const Vec3 on_b = pair_.direction_on_b(d);
+    Witness& w = witness_[v];
+    w.a = pair_.place_a(core_a_->points[core_a_->support(d)]);
+    w.b = pair_.place_b(core_b_->points[core_b_->support(on_b)]);
+    w.d = d;
+    w.on_a.patch = w.on_b.patch = -1;
+    return take(v, d.dot(w.a - w.b) + shrink_ + core_error_);
+  }
+
+  // A point whose witnesses are there, and the overlap p along its direction.
+  int take(int v, double p) {
+    Witness& w = witness_[v];
+    const Vec3& d = w.d;
     w.p = p;
     Vec3 g = w.a - w.b;
     if (joggle_ > 0) g += joggle_ * scatter(g);
@@ -291,6 +323,7 @@ class Search {
   // W_A + W_B of the cores at the supports of point v, in the tangent plane of d spanned by t and s: what
   // p(d) of the cores bends by there, but for p itself.
   bool core_turn(int v, const Vec3& d, const Vec3& t, const Vec3& s, Mat2* turn) const {
+    if (core_a_) return false;
     Mat2 wa, wb;
     const Witness& w = witness_[v];
     const Mat3 back = pair_.turn.transpose();
@@ -328,6 +361,7 @@ class Search {
   //     p >= y0 - s' t + (m0 - y0) t^2 / 2 (1 - t^2 / 12) - rho t^3 / 6,
   // the factor only where m0 > y0.
   double cover(int v) {
+    if (core_a_) return 0;
     const Witness w = witness_[v];
     const Vec3 d = w.d, t = d.unitOrthogonal(), s = d.cross(t), g = hull_.point(v);
     const double level = -lower_ - kCapDepth * tolerance_ - shrink_;
@@ -679,6 +713,8 @@ class Search {
   const PairFrame& pair_;
   double tolerance_, joggle_;
   double shrink_a_, shrink_b_, shrink_;
+  const SpheroPolyhedron *core_a_ = nullptr, *core_b_ = nullptr;  // both, or none
+  double core_error_ = 0;
   double valid_ = M_PI;  // what the cores hold for: directions within it of the middle
   Vec3 middle_ = Vec3::Zero();
   double lower_ = -kFarAway, upper_ = kFarAway, near_ = -kFarAway;

@@ -234,6 +234,7 @@ constexpr int kHullAttempts = 6;        // from other directions, when round-off
 constexpr double kHullTurn = 0.2;       // between them
 constexpr double kCoreShare = 0.5;      // of the smaller of the bodies' least curvature radii taken off, the
                                         // other wholly: more would leave two spheres no volume
+constexpr double kCoreError = 0.1;      // of the tolerance, that sphero-polyhedra may be off by
 constexpr double kFlatStart = 1e-3;     // volume of a first tetrahedron over its longest edge cubed, at least
 constexpr int kFlatRounds = 4;          // of looking for a better one
 constexpr double kLeastHeight = 0.02;   // of the tolerance: a point less high above a face is not added

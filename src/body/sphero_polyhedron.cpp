@@ -1,0 +1,183 @@
+// Centres of the patches that lie on balls; see sphero_polyhedron.h.
+#include "body/sphero_polyhedron.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "body/bounds.h"
+#include "body/rounding.h"
+#include "body/shape.h"
+
+namespace nurbs {
+namespace {
+
+constexpr int kMostPoints = 64;
+constexpr double kMostError = 5e-11;   // of the bounding radius
+constexpr double kMostKink = 1e-6;     // rad
+constexpr double kNearCentre = 1e-3;   // of the radius: further ones are another point's
+constexpr double kOnBall = 1e-13;      // of the bounding radius: off a ball
+constexpr double kSameWeight = 1e-13;  // relative
+constexpr double kSamePoint = 1e-12;   // of the bounding radius: of corners
+constexpr double kTwoNormals = 1e-3;   // rad: closer ones give no radius
+
+struct Sample {
+  Vec3 x, n;
+};
+
+Sample sample(const BezierPatch& patch, double u, double v) {
+  const Jet1 jet = evaluate1(patch, u, v);
+  return {jet.s, jet.su.cross(jet.sv).normalized()};
+}
+
+// How far the squared distance of a patch's points from a centre is from radius^2, at most, over that.
+double off_ball(BezierPatch patch, const Vec3& centre, double radius) {
+  for (Vec4& p : patch.points) p.head<3>() = (p.head<3>() - p[3] * centre) / radius;
+  return bound_off_unit_sphere(patch);
+}
+
+// The radius that two normals across a patch give, those that differ most, away from edges that may be
+// collapsed.
+struct Curved {
+  double radius = 0, angle = 0;
+};
+Curved curved(const BezierPatch& patch) {
+  const Sample corner[] = {sample(patch, 0.05, 0.05), sample(patch, 0.95, 0.05), sample(patch, 0.05, 0.95),
+                           sample(patch, 0.95, 0.95)};
+  Curved out{0, kTwoNormals};
+  for (const Sample& s : corner)
+    for (const Sample& t : corner)
+      if (const double apart = (s.n - t.n).norm(); apart > out.angle)
+        out = {(s.n - t.n).dot(s.x - t.x) / (apart * apart), apart};
+  return out;
+}
+
+// Whether the lines of one parameter (v, or u) are straight from edge to edge: control points divide them all
+// alike, with weights in the same proportions.
+bool is_ruled(const BezierPatch& patch, bool along_v, double size) {
+  const int lines = along_v ? patch.degree_u : patch.degree_v, last = along_v ? patch.degree_v : patch.degree_u;
+  const auto point = [&](int line, int k) -> const Vec4& {
+    return along_v ? patch.point(line, k) : patch.point(k, line);
+  };
+  if (last == 1) return true;
+  const auto at = [&](int line, int k) -> Vec3 { return point(line, k).head<3>() / point(line, k)[3]; };
+  int longest = 0;
+  for (int i = 1; i <= lines; ++i)
+    if ((at(i, last) - at(i, 0)).norm() > (at(longest, last) - at(longest, 0)).norm()) longest = i;
+  const Vec3 along = at(longest, last) - at(longest, 0);
+  for (int k = 1; k < last; ++k) {
+    const double share = along.dot(at(longest, k) - at(longest, 0)) / along.squaredNorm();
+    const double weight = point(longest, k)[3] / point(longest, 0)[3];
+    if (!(share >= 0 && share <= 1)) return false;
+    for (int i = 0; i <= lines; ++i) {
+      const Vec3 there = (1 - share) * at(i, 0) + share * at(i, last);
+      if (!((at(i, k) - there).norm() <= kOnBall * size)) return false;
+      if (!(std::abs(point(i, k)[3] / point(i, 0)[3] - weight) <= kSameWeight * weight)) return false;
+    }
+  }
+  return true;
+}
+
+class Finder {
+ public:
+  explicit Finder(const Shape& shape) : shape_(shape), on_ball_(shape.patches.size(), false) {}
+
+  SpheroPolyhedron polyhedron() const {
+    SpheroPolyhedron out;
+    for (const BezierPatch& patch : shape_.patches)
+      for (const Vec4& p : patch.points) {
+        const Vec3 x = p.head<3>() / p[3];
+        const auto same = [&](const Vec3& y) { return (x - y).norm() <= kSamePoint * shape_.bounding_radius; };
+        if (std::any_of(out.points.begin(), out.points.end(), same)) continue;
+        if (out.points.size() == kMostPoints) return {};
+        out.points.push_back(x);
+      }
+    out.error = kSamePoint * shape_.bounding_radius;
+    return out;
+  }
+
+  SpheroPolyhedron rounded() {
+    out_.error = shape_.concavity + kJointRoundoff * shape_.bounding_radius;
+    for (const auto& links : shape_.links)
+      for (const EdgeLink& link : links)
+        if (!(std::abs(link.kink) <= kMostKink)) return {};
+    take_radius();
+    if (!(out_.radius > 0) || !balls() || out_.points.empty()) return {};
+    for (int k = 0; k < static_cast<int>(shape_.patches.size()); ++k)
+      if (!on_ball_[k] && !is_between(k)) return {};
+    out_.error += 0.5 * kMostKink * kMostKink * out_.radius;
+    if (!(out_.error <= kMostError * shape_.bounding_radius)) return {};
+    return out_;
+  }
+
+ private:
+  bool is_on_ball(double off, double radius) const {
+    return off * radius <= kOnBall * shape_.bounding_radius;
+  }
+
+  // Of the part of a ball whose normals differ most.
+  void take_radius() {
+    double widest = 0;
+    for (const BezierPatch& patch : shape_.patches) {
+      const Curved c = curved(patch);
+      if (!(c.angle > widest && c.radius > 0)) continue;
+      const Sample middle = sample(patch, 0.5, 0.5);
+      if (!is_on_ball(off_ball(patch, middle.x - c.radius * middle.n, c.radius), c.radius)) continue;
+      widest = c.angle;
+      out_.radius = c.radius;
+    }
+  }
+
+  // Takes every patch that lies on a ball of that radius; false if there are too many.
+  bool balls() {
+    for (int k = 0; k < static_cast<int>(shape_.patches.size()); ++k) {
+      const BezierPatch& patch = shape_.patches[k];
+      const Sample middle = sample(patch, 0.5, 0.5);
+      const Vec3 centre = middle.x - out_.radius * middle.n;
+      double off = kFarAway;
+      const auto holds = [&](const Vec3& point) {
+        return (point - centre).norm() <= kNearCentre * out_.radius &&
+               is_on_ball(off = off_ball(patch, point, out_.radius), out_.radius);
+      };
+      if (std::none_of(out_.points.begin(), out_.points.end(), holds)) {
+        if (!holds(centre)) continue;
+        if (out_.points.size() == kMostPoints) return false;
+        out_.points.push_back(centre);
+      }
+      on_ball_[k] = true;
+      off_ = std::max(off_, off * out_.radius);
+    }
+    out_.error += off_;
+    return true;
+  }
+
+  // Whether a patch is plane, or ruled between parts of balls.
+  bool is_between(int k) const {
+    const BezierPatch& patch = shape_.patches[k];
+    if (rounding(patch) == kFarAway) return true;
+    const auto held = [&](int edge) {
+      const EdgeLink& link = shape_.links[k][edge];
+      return link.collapsed || (link.patch >= 0 && on_ball_[link.patch]);
+    };
+    const double size = shape_.bounding_radius;
+    return (held(0) && held(1) && is_ruled(patch, false, size)) ||
+           (held(2) && held(3) && is_ruled(patch, true, size));
+  }
+
+  const Shape& shape_;
+  double off_ = 0;
+  std::vector<bool> on_ball_;
+  SpheroPolyhedron out_;
+};
+
+}  // namespace
+
+SpheroPolyhedron find_sphero_polyhedron(const Shape& shape) {
+  if (shape.joint_slack > 0) return {};
+  Finder finder(shape);
+  const auto plane = [](const BezierPatch& patch) { return rounding(patch) == kFarAway; };
+  if (shape.bilinear && std::all_of(shape.patches.begin(), shape.patches.end(), plane))
+    return finder.polyhedron();
+  return finder.rounded();
+}
+
+}  // namespace nurbs

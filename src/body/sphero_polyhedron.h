@@ -1,0 +1,42 @@
+// Sphero-polyhedra: what a ball sweeps whose centre moves in a convex polyhedron. Capsules, boxes and polyhedra
+// with rounded edges are some, and polyhedra themselves, whose ball is a point.
+#pragma once
+
+#include <vector>
+
+#include "nurbs/types.h"
+
+namespace nurbs {
+
+struct Shape;
+
+// Lengths of the shape frame. For every unit d the body's support is max over points of d . x, and `radius`
+// more, within `error`.
+struct SpheroPolyhedron {
+  std::vector<Vec3> points;  // none: the body is no such one, or isn't known to be
+  double radius = 0;
+  double error = 0;
+
+  bool found() const { return !points.empty(); }
+  // The number of the point that is farthest along d, of any length; the first of equal ones.
+  int support(const Vec3& d) const {
+    int best = 0;
+    double most = d.dot(points[0]);
+    for (int k = 1; k < static_cast<int>(points.size()); ++k)
+      if (const double h = d.dot(points[k]); h > most) most = h, best = k;
+    return best;
+  }
+};
+
+// Of a shape of which all but the search tables is done. Found by positions:
+//   * The body is in it: its patches are planar, or straight one way between edges that they share with parts
+//     of balls, or parts of balls of `radius` about one of the points, proven from Bernstein coefficients.
+//     Points inside a plane region or a straight line are no extreme ones, so the balls' parts have them all.
+//   * It is in the body: where that has its support it is on such a part and, normals being continuous, in
+//     the direction of its normal from the part's centre v, so that h(d) - radius is v . d there, continuous,
+//     and as convex where two parts meet as h is: the largest of all v . d. This rests on normals and
+//     convexity as measured (kinks, Shape::concavity), at slivers to round-off only.
+// Polyhedra: bilinear planar patches, whose corners are of the body and have it in their hull.
+SpheroPolyhedron find_sphero_polyhedron(const Shape& shape);
+
+}  // namespace nurbs
