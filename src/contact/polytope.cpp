@@ -77,9 +77,10 @@ class Search {
       core_error_ = pair.scale_a * core_a_->error + pair.scale_b * core_b_->error;
       return;
     }
+    core_error_ = pair.scale_a * pair.a->core.error + pair.scale_b * pair.b->core.error;
     // No ball that rolls inside is larger than the largest inside (a sphere's radii are bounds of it).
-    shrink_a_ = pair.scale_a * std::min(pair.a->curvature.min_radius, pair.a->inner_radius);
-    shrink_b_ = pair.scale_b * std::min(pair.b->curvature.min_radius, pair.b->inner_radius);
+    shrink_a_ = pair.scale_a * pair.a->rolling_radius();
+    shrink_b_ = pair.scale_b * pair.b->rolling_radius();
     (shrink_a_ < shrink_b_ ? shrink_a_ : shrink_b_) *= kCoreShare;
     shrink_ = shrink_a_ + shrink_b_;
   }
@@ -249,12 +250,19 @@ class Search {
                                         near < 0 ? nullptr : &witness_[near].on_b, tolerance_);
     Witness& w = witness_[v];
     // The centres of balls that touch there from inside lie in the cores, exactly.
-    w.a = pair_.place_a(sa.point) - shrink_a_ * sa.normal;
-    w.b = pair_.place_b(sb.point) - shrink_b_ * (pair_.turn * sb.normal);
+    w.a = cored(*pair_.a, pair_.scale_a, sa, d, shrink_a_);
+    w.b = pair_.offset + pair_.turn * cored(*pair_.b, pair_.scale_b, sb, pair_.direction_on_b(d), shrink_b_);
     w.d = d;
     w.on_a = sa.where;
     w.on_b = sb.where;
     return take(v, pair_.overlap_along(d, sa.upper, sb.upper));
+  }
+
+  // Of a body in its own axes, lengths of the lab: where the core, less a ball of radius `shrink`, has its
+  // support along unit e. Of a sphero-polyhedron that does not rest on the surface's normal.
+  static Vec3 cored(const Shape& shape, double scale, const Support& on, const Vec3& e, double shrink) {
+    if (!shape.core.found() || shrink > scale * shape.core.radius) return scale * on.point - shrink * on.normal;
+    return scale * shape.core.points[shape.core.support(e)] + (scale * shape.core.radius - shrink) * e;
   }
 
   // The same of two sphero-polyhedra.

@@ -67,8 +67,8 @@ struct View {
     circles = m->revolution.found && sine < kNearAxis;
     if (circles) tilt = sine;
     if (!core) return;
-    ball = kCore * scale_m * std::min(m->curvature.min_radius, m->inner_radius);
-    ball_k = kCore * scale_k * std::min(k->curvature.min_radius, k->inner_radius);
+    ball = kCore * scale_m * m->rolling_radius();
+    ball_k = kCore * scale_k * k->rolling_radius();
   }
   Vec3 across(const Vec3& x) const { return x - axis.dot(x) * axis; }
 };
@@ -184,7 +184,8 @@ class RingSearch {
     noise_ = 2 * kRoundoff *
                  (view_.scale_k * view_.k->bounding_radius + view_.scale_m * view_.m->bounding_radius) +
              view_.scale_k * (view_.k->revolution.error + view_.k->meridian.error) +
-             (view_.circles ? view_.scale_m * view_.mate_error : 0.0);
+             (view_.circles ? view_.scale_m * view_.mate_error : 0.0) + view_.scale_k * view_.k->core.error +
+             view_.scale_m * view_.m->core.error;
   }
 
   bool run(bool last, PolytopeResult* result) {
@@ -253,7 +254,7 @@ class RingSearch {
     ++queries_;
     Circle c;
     const Vec3 x = view_.turn_k * (view_.scale_k * k.point - view_.ball_k * k.normal),
-               xm = view_.turn_m * (view_.scale_m * m.point - view_.ball * m.normal);
+               xm = view_.turn_m * mate_core(m, view_.turn_m.transpose() * -e);
     c.z = view_.axis.dot(x - view_.point);
     c.r = view_.across(x - view_.point).norm();
     c.at = {view_.axis.dot(e), view_.across(e).norm()};
@@ -280,6 +281,14 @@ class RingSearch {
       on_m_ = last_m_;
     }
     return true;
+  }
+
+  // Of the mate in its own axes: its core's support along unit `own`.
+  Vec3 mate_core(const Support& on, const Vec3& own) const {
+    const SpheroPolyhedron& core = view_.m->core;
+    const double left = core.found() ? view_.scale_m * core.radius - view_.ball : -1;
+    if (left < 0) return view_.scale_m * on.point - view_.ball * on.normal;
+    return view_.scale_m * core.points[core.support(own)] + left * own;
   }
 
   // Circles are kept by the angle they were asked for. Chosen are those asked for in a sector, and some
@@ -638,7 +647,7 @@ bool search_rings(const PairFrame& pair, double tolerance, bool last, PolytopeRe
     const Shape& k = k_is_a ? *pair.a : *pair.b;
     if (!k.revolution.found || k.proofs.sphere) continue;
     const Shape& mate = k_is_a ? *pair.b : *pair.a;
-    const bool round = mate.curvature.min_radius > 0 && !mate.proofs.sphere;
+    const bool round = mate.rolling_radius() > 0 && !mate.proofs.sphere;
     // Circles of a mate about nearly the same axis serve better, unless it ends in spheres.
     const Vec3 axis = k_is_a ? Vec3(pair.turn * mate.revolution.axis) : mate.revolution.axis,
                own = k_is_a ? k.revolution.axis : Vec3(pair.turn * k.revolution.axis);
