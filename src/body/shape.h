@@ -20,8 +20,8 @@
 #include "body/normal_map.h"
 #include "body/profile_radii.h"
 #include "body/revolution.h"
-#include "body/sphero_polyhedron.h"
 #include "body/rolling.h"
+#include "body/sphero_polyhedron.h"
 #include "nurbs/bezier_patch.h"
 #include "nurbs/nurbs_surface.h"
 #include "nurbs/tolerances.h"
@@ -140,7 +140,9 @@ struct Shape {
   // Balls inside the body over directions.
   const InnerMap& inner_map() const { return lazy_inner_map.of(*this); }
   // Of the largest ball that is known to roll inside the body.
-  double rolling_radius() const { return std::max(std::min(curvature.min_radius, inner_radius), core.radius); }
+  double rolling_radius() const {
+    return std::max(std::min(curvature.min_radius, inner_radius), core.radius);
+  }
   // Whether a local maximum of d . x may be no global one.
   bool dented() const { return support_excess > kRoundoff * bounding_radius; }
 };

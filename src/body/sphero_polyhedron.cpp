@@ -54,7 +54,8 @@ Curved curved(const BezierPatch& patch) {
 // Whether the lines of one parameter (v, or u) are straight from edge to edge: control points divide them all
 // alike, with weights in the same proportions.
 bool is_ruled(const BezierPatch& patch, bool along_v, double size) {
-  const int lines = along_v ? patch.degree_u : patch.degree_v, last = along_v ? patch.degree_v : patch.degree_u;
+  const int lines = along_v ? patch.degree_u : patch.degree_v,
+            last = along_v ? patch.degree_v : patch.degree_u;
   const auto point = [&](int line, int k) -> const Vec4& {
     return along_v ? patch.point(line, k) : patch.point(k, line);
   };
@@ -86,7 +87,9 @@ class Finder {
     for (const BezierPatch& patch : shape_.patches)
       for (const Vec4& p : patch.points) {
         const Vec3 x = p.head<3>() / p[3];
-        const auto same = [&](const Vec3& y) { return (x - y).norm() <= kSamePoint * shape_.bounding_radius; };
+        const auto same = [&](const Vec3& y) {
+          return (x - y).norm() <= kSamePoint * shape_.bounding_radius;
+        };
         if (std::any_of(out.points.begin(), out.points.end(), same)) continue;
         if (out.points.size() == kMostPoints) return {};
         out.points.push_back(x);

@@ -1,5 +1,5 @@
-// Sphero-polyhedra: what a ball sweeps whose centre moves in a convex polyhedron. Capsules, boxes and polyhedra
-// with rounded edges are some, and polyhedra themselves, whose ball is a point.
+// Sphero-polyhedra: what a ball sweeps whose centre moves in a convex polyhedron. Capsules, boxes and
+// polyhedra with rounded edges are some, and polyhedra themselves, whose ball is a point.
 #pragma once
 
 #include <vector>

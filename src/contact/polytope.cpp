@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "body/cube_map.h"
+#include "contact/cell_search.h"
 #include "contact/growing_hull.h"
 #include "contact/local_bend.h"
 #include "contact/ring_search.h"
@@ -40,6 +41,7 @@ struct Bend {
   std::array<double, kStretchCaps.size()> stretch{}, near{};  // the same from finer cells
 };
 
+constexpr int kPointAttempts = 2;         // flat differences of points may have no hull
 constexpr int kBeforeRings = 64;          // queries before rings of directions are looked for
 constexpr int kBentBeforeRings = 192;     // ... of bodies without sharp edges, which caps may do for
 constexpr int kAtPoles = 256;             // ... and where the least overlap is along an axis
@@ -65,19 +67,19 @@ constexpr std::array<double, 8> kCoreCaps = {0.4, 0.25, 0.16, 0.11, 0.075, 0.048
 // Everything the search over directions keeps.
 class Search {
  public:
-  Search(const PairFrame& pair, double tolerance, double joggle)
+  // `points`: of two sphero-polyhedra nothing else is left.
+  Search(const PairFrame& pair, double tolerance, double joggle, bool points)
       : pair_(pair), tolerance_(tolerance), joggle_(joggle), hull_(kSliver * pair.reach) {
-    if (pair.both_sphero_polyhedra(tolerance)) {
-      // Nothing but points is left: the hull is their difference's, as exact as they are.
+    core_error_ = pair.scale_a * pair.a->core.error + pair.scale_b * pair.b->core.error;
+    if (points && pair.both_sphero_polyhedra(tolerance)) {
+      // The hull is their points' difference's, as exact as they are.
       core_a_ = &pair.a->core;
       core_b_ = &pair.b->core;
       shrink_a_ = pair.scale_a * core_a_->radius;
       shrink_b_ = pair.scale_b * core_b_->radius;
       shrink_ = shrink_a_ + shrink_b_;
-      core_error_ = pair.scale_a * core_a_->error + pair.scale_b * core_b_->error;
       return;
     }
-    core_error_ = pair.scale_a * pair.a->core.error + pair.scale_b * pair.b->core.error;
     // No ball that rolls inside is larger than the largest inside (a sphere's radii are bounds of it).
     shrink_a_ = pair.scale_a * pair.a->rolling_radius();
     shrink_b_ = pair.scale_b * pair.b->rolling_radius();
@@ -261,7 +263,8 @@ class Search {
   // Of a body in its own axes, lengths of the lab: where the core, less a ball of radius `shrink`, has its
   // support along unit e. Of a sphero-polyhedron that does not rest on the surface's normal.
   static Vec3 cored(const Shape& shape, double scale, const Support& on, const Vec3& e, double shrink) {
-    if (!shape.core.found() || shrink > scale * shape.core.radius) return scale * on.point - shrink * on.normal;
+    if (!shape.core.found() || shrink > scale * shape.core.radius)
+      return scale * on.point - shrink * on.normal;
     return scale * shape.core.points[shape.core.support(e)] + (scale * shape.core.radius - shrink) * e;
   }
 
@@ -756,7 +759,7 @@ PolytopeResult solve_polytope(const PairFrame& pair, const Vec3& seed, double to
   Vec3 from = seed;
   for (int attempt = 0; attempt < kHullAttempts; ++attempt) {
     const double joggle = attempt > 0 ? std::min(kJoggle * pair.reach, 0.05 * tolerance) : 0.0;
-    Search search(pair, tolerance, joggle);
+    Search search(pair, tolerance, joggle, attempt < kPointAttempts);
     if (attempt % 2 == 1) search.let_be();
     const bool started = search.start(from);
     if (started && attempt == 0 && (pair.a->revolution.found || pair.b->revolution.found)) {
@@ -777,7 +780,8 @@ PolytopeResult solve_polytope(const PairFrame& pair, const Vec3& seed, double to
     if (best.converged || best.bracket.lower > enough || (started && !search.stalled())) break;
     from = best.bracket.direction + kHullTurn * (attempt + 1) * Vec3(0.36, -0.48, 0.8);
   }
-  if (!best.converged && !(best.bracket.lower > enough)) search_rings(pair, tolerance, true, &best);
+  if (!best.converged && !(best.bracket.lower > enough) && !search_rings(pair, tolerance, true, &best))
+    search_cells(pair, tolerance, &best);
   return best;
 }
 
