@@ -701,10 +701,12 @@ class Search {
 
   // The witnesses of direction_: the hull's point nearest to the origin or, when that is inside, to its foot
   // on the supporting plane. A flat of the obstacle is several triangles; witnesses from another one, or from
-  // the far side of a body that has two equal minima, would not face each other.
+  // the far side of a body that has two equal minima, would not face each other. About a minimum whose cap is
+  // proven the hull stays coarse, and what is given away there belongs to neither body: where the supports
+  // along direction_, *a and *b at first, face each other more nearly, they stay.
   void find_witness(Vec3* a, Vec3* b) const {
     const Vec3 target = std::min(0.0, lower_ + shrink_) * -direction_;
-    double best = kFarAway;
+    double best = (*a - *b - target).squaredNorm();
     for (int k = 0; k < hull_.faces(); ++k) {
       const GrowingHull::Face& f = hull_.face(k);
       if (!f.alive) continue;

@@ -6,8 +6,11 @@
 #include <cmath>
 #include <vector>
 
+#include "body/support.h"
 #include "contact/pair_search.h"
+#include "io/pair_case.h"
 #include "support/bodies.h"
+#include "support/cases.h"
 #include "support/pairs.h"
 
 namespace nurbs {
@@ -105,6 +108,25 @@ TEST(DeepContacts, turning_changes_the_gap_by_no_more_than_the_way_of_the_outerm
   EXPECT_LE(path.worst_change, 1 + 1e-5);
   EXPECT_GE(path.jumps, 1);
   EXPECT_LT(path.worst_memory, 2e-9);
+}
+
+// An eighth of a ball deep inside an ellipsoid of 1e4 its size. The hull of directions is coarse where caps
+// prove the minimum, and its nearest triangle was taken for the contact points: they lay 0.7 off their
+// bodies, along the normal, one outside and one inside.
+TEST(DeepContacts, points_lie_on_their_bodies_where_caps_prove_the_minimum) {
+  const PairCase c = read_pair_case(case_file("octant-in-large-ellipsoid"));
+  for (const bool maps : {false, true}) {
+    if (maps) c.a.shape->inner_map(), c.b.shape->inner_map();
+    double memory[kPairMemorySize] = {0};
+    const ContactResult r = find_contact(c.a, c.b, c.settings, memory);
+    ASSERT_EQ(r.status, Status::converged);
+    const double allowed = c.settings.tolerance * c.a.scale * c.a.shape->bounding_radius;
+    const auto beyond = [&](const Particle& p, const Vec3& d, const Vec3& point) {
+      return d.dot(point) - p.scale * find_hull_support(*p.shape, p.q.conjugate() * d).h;
+    };
+    EXPECT_NEAR(beyond(c.a, r.normal, r.point_a), 0, allowed);
+    EXPECT_NEAR(beyond(c.b, -r.normal, r.point_b - (c.b.x - c.a.x)), 0, allowed);
+  }
 }
 
 }  // namespace
