@@ -49,6 +49,13 @@ std::string lower(std::string s) {
   throw ShapeError(file + ": " + what);
 }
 
+// Whether a word is a finite number and nothing else.
+bool whole_number(const std::string& word, double& x) {
+  char* end = nullptr;
+  x = std::strtod(word.c_str(), &end);
+  return end != word.c_str() && *end == 0 && std::isfinite(x);
+}
+
 // Words of a text, with the line they are on.
 class Words {
  public:
@@ -65,10 +72,8 @@ class Words {
   double number(const char* what) {
     std::string word;
     if (!next(word)) bad(std::string("ends before ") + what);
-    char* end = nullptr;
-    const double x = std::strtod(word.c_str(), &end);
-    if (*end != 0 || !std::isfinite(x))
-      bad("'" + word.substr(0, 40) + "' is not a finite number for " + what);
+    double x = 0;
+    if (!whole_number(word, x)) bad("'" + word.substr(0, 40) + "' is not a finite number for " + what);
     return x;
   }
   void skip_line() {
@@ -190,8 +195,9 @@ TriangleMesh read_obj(const std::string& file, const std::string& text) {
     words >> kind;
     if (kind == "v") {
       Vec3 p;
+      std::string word;
       for (int c = 0; c < 3; ++c)
-        if (!(words >> p[c]) || !std::isfinite(p[c])) bad("a vertex needs three finite numbers");
+        if (!(words >> word) || !whole_number(word, p[c])) bad("a vertex needs three finite numbers");
       mesh.points.push_back(p);
     } else if (kind == "f") {
       std::vector<int> corners;
@@ -311,7 +317,8 @@ class PlyReader {
       const char* begin = text_.c_str() + at_;
       char* end = nullptr;
       const double x = std::strtod(begin, &end);
-      if (end == begin) fail(file_, "the PLY file ends too early or holds what is no number");
+      if (end == begin || (*end != 0 && !std::isspace(static_cast<unsigned char>(*end))))
+        fail(file_, "the PLY file ends too early or holds what is no number");
       at_ += static_cast<size_t>(end - begin);
       return x;
     }
@@ -342,10 +349,13 @@ class PlyReader {
         continue;
       }
       const double count = value(p.count_type);
-      if (!(count >= 0 && count <= 1e6)) fail(file_, "a PLY list of impossible length");
+      if (!(count >= 0 && count <= 1e6 && count == std::floor(count)))
+        fail(file_, "a PLY list of impossible length");
       const bool is_face = names_corners(p);
       for (int k = 0; k < static_cast<int>(count); ++k) {
         const double index = value(p.type);
+        if (is_face && index != std::floor(index))
+          fail(file_, "a face names a vertex by what is no whole number");
         if (is_face) corners.push_back(index >= 0 && index < 2e9 ? static_cast<int>(index) : -1);
       }
     }

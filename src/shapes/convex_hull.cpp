@@ -195,23 +195,24 @@ int ConvexHull::climb(const Vec3& d, int start) const {
   return at;
 }
 
-double ConvexHull::distance(const Vec3& x, double enough, int& start) const {
+Vec3 ConvexHull::way(const Vec3& x, double enough, int& start) const {
   Vec3 simplex[4] = {mesh_.points[start] - x};
   int count = 1;
   Vec3 nearest = simplex[0];
   for (int k = 0; k < kGjkIterations; ++k) {
     const double far = nearest.norm();
-    if (far <= std::max(enough, kGjkTolerance * extent_)) return far <= kGjkTolerance * extent_ ? 0 : far;
+    if (far <= std::max(enough, kGjkTolerance * extent_))
+      return far <= kGjkTolerance * extent_ ? Vec3(Vec3::Zero()) : nearest;
     start = support(-nearest, start);
     const Vec3 y = mesh_.points[start] - x;
-    if (far * far - nearest.dot(y) <= kGjkTolerance * extent_ * far) return far;
+    if (far * far - nearest.dot(y) <= kGjkTolerance * extent_ * far) return nearest;
     for (int i = 0; i < count; ++i)
-      if (simplex[i] == y) return far;
+      if (simplex[i] == y) return nearest;
     simplex[count++] = y;
     nearest = nearest_on_simplex(simplex, count);
-    if (count == 4) return 0;
+    if (count == 4) return Vec3::Zero();
   }
-  return nearest.norm();
+  return nearest;
 }
 
 }  // namespace nurbs

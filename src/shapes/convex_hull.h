@@ -36,7 +36,10 @@ class ConvexHull {
   // Upper bound of the distance from x to the hull, 0 inside: that to a point of it, found by Gilbert's,
   // Johnson's and Keerthi's algorithm to 1e-9 of the extent; the search ends early at `enough`. `start` as
   // above, and left at a vertex near x.
-  double distance(const Vec3& x, double enough, int& start) const;
+  double distance(const Vec3& x, double enough, int& start) const { return way(x, enough, start).norm(); }
+
+  // From x to the point of the hull that this is the distance to; zero inside.
+  Vec3 way(const Vec3& x, double enough, int& start) const;
 
  private:
   void measure();  // what depends on where the vertices are

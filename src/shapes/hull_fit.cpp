@@ -78,8 +78,13 @@ constexpr double kRateGain = 1;
 constexpr int kBisections = 14;      // of a rounding that the hull has already ...
 constexpr double kSurelyNear = 0.1;  // ... unless it is as near as this share of the tolerance
 constexpr int kRoundings = 2;        // ... whose radius is found by the distance of the first one
-constexpr int kHalvings = 12;        // ... and that is halved where it fits nowhere
-constexpr int kRimPoints = 96;       // of a circle, at which its distance from the hull is looked at
+constexpr double kLeastCut = 0.01;   // of the tolerance, of a corner that a rounding takes
+// How far a polyhedron of few faces may stand out of a hull before it is moved inward, and by how much; and
+// of one too thin for that. Shares of the tolerance.
+constexpr double kExcess = 1.4, kExcessInward = 0.6, kThinExcess = 0.9;
+constexpr int kMoreRoundings = 5;  // .. of a polyhedron of other faces than the hull's
+constexpr int kHalvings = 12;      // ... and that is halved where it fits nowhere
+constexpr int kRimPoints = 96;     // of a circle, at which its distance from the hull is looked at
 constexpr double kRimCut = 0.7,
                  kChordCut = 0.25;    // of the tolerance: what corners and a coarser profile take
 constexpr size_t kMostProfile = 400;  // corners of the hull's own profile ...
@@ -414,7 +419,8 @@ class HullFitter {
     if (any && !best_.shape && options_.most_points == 0 && try_faces(kMostFaces * kPointsPerFace))
       return best_;
     if (best_.shape) return best_;  // its convexity is measured, not proven
-    if (any && options_.most_points == 0 && try_polyhedron(kMostFacesAtLast)) return best_;
+    if (any && options_.most_points == 0 && (try_few_faces() || try_polyhedron(kMostFacesAtLast)))
+      return best_;
     if (best_.shape) return best_;
     if (options_.most_points > 0)
       throw ShapeError("no body of at most " + std::to_string(options_.most_points) +
@@ -422,7 +428,7 @@ class HullFitter {
                        " of the hull");
     throw ShapeError("no body of up to " + std::to_string(most_points_) +
                      " control points is within the tolerance of " + percent(options_.tolerance) +
-                     " of the hull; the best is within " + percent(least_) +
+                     " of the hull" + (least_ < kFar ? "; the best is within " + percent(least_) : "") +
                      ": raise the tolerance, or, as flat faces and sharp edges want many points, take them "
                      "from `make` or `import`");
   }
@@ -572,23 +578,45 @@ class HullFitter {
     return false;
   }
 
+  // A polyhedron about the hull of fewer faces than it has; those that are not the hull's are moved inward by
+  // nearly half of what it stands out, and its edges rounded by what that leaves of the tolerance.
+  bool try_few_faces() {
+    for (const auto& [excess, inward] : {std::pair(kExcess, kExcessInward), std::pair(kThinExcess, 0.0)}) {
+      std::vector<HalfSpace> faces;
+      try {
+        faces =
+            enclosing_faces(hull_, mass_.center, excess * tolerance_, inward * tolerance_, kMostFacesAtLast);
+      } catch (const ShapeError&) {  // flatter than its digits tell
+      }
+      const size_t own = facets(hull_, kMostFacesAtLast, face_roundoff()).size();
+      if (faces.empty() || (own > 0 && own <= faces.size())) continue;
+      if (try_rounded(faces, inward * tolerance_)) return true;
+    }
+    return false;
+  }
+
   static std::string rounded_kind(size_t faces) {
     return "polyhedron of " + std::to_string(faces) + " faces with rounded edges";
   }
 
-  bool try_rounded(const std::vector<HalfSpace>& faces) {
+  // `inward`: how far inside of the hull faces are.
+  bool try_rounded(const std::vector<HalfSpace>& faces, double inward = 0) {
     const std::string kind = rounded_kind(faces.size());
     const auto rounded = [&](double rounding) {
       return make_shape("fit", rounded_polyhedron(faces, mass_.center, rounding));
     };
-    double rounding = tolerance_;
+    double rounding = tolerance_ - inward;
     std::string why;
-    for (int k = 0, halved = 0; k < kRoundings && halved <= kHalvings;) {
+    const int most = inward > 0 ? kMoreRoundings : kRoundings;
+    for (int k = 0, halved = 0; k < most && halved <= kHalvings;) {
       try {
         const auto body = rounded(rounding);
-        if (++k == kRoundings && judge(body->surfaces, kind, true)) return true;
-        const HullDistance d = hull_distance(*body, hull_, 0.01 * tolerance_);
-        const double next = rounding * kAim * tolerance_ / d.worst();  // a corner's distance grows with it
+        const bool to_judge = ++k >= kRoundings;
+        if (to_judge && judge(body->surfaces, kind, true)) return true;
+        const HullDistance d = to_judge ? judged_ : hull_distance(*body, hull_, 0.01 * tolerance_);
+        // A corner's distance grows with it.
+        const double cut = (inward > 0 ? d.inward : d.worst()) - inward;
+        const double next = rounding * (kAim * tolerance_ - inward) / std::max(cut, kLeastCut * tolerance_);
         rounding = halved > 0 ? std::min(next, rounding) : next;
       } catch (const ShapeError& error) {  // too round for a thin body
         why = error.what();

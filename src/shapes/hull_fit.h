@@ -44,8 +44,9 @@ struct HullFit {
 // patches of growing numbers of spans, polynomial ones (convex_fit.h), then rational ones (gauge_fit.h), as
 // far as the errors of those before leave hope; whose certified distance is within the tolerance, which load
 // without a dent and are proven convex; of that many spans then the one of the largest least curvature found.
-// Where none is proven convex, the first that is within the tolerance. Throws ShapeError when there is none,
-// naming the best that was reached. Seconds; 10 to 30 where a rough hull wants thousands of points.
+// Where none is proven convex, the first that is within the tolerance; where none is, a rounded polyhedron of
+// up to 300 faces, the hull's own or fewer about it. Throws ShapeError when there is none, naming the best
+// that was reached. Seconds; 10 to 30 where a rough hull wants thousands of points.
 HullFit fit_hull(const ConvexHull& hull, const HullFitOptions& options);
 
 }  // namespace nurbs

@@ -23,6 +23,8 @@ constexpr double kBlunt = 2e-5;      // least |S_u x S_v| over the extent square
 constexpr size_t kLargestTriangles = 200, kMostLargeFaces = 30;
 constexpr double kMuchLarger = 2.5, kSamePlane = 1e-3;
 
+constexpr double kSomeSize = 0.01;  // of a hull's surface: faces that an enclosing polyhedron keeps
+
 // A face of the eroded polyhedron: unit normal and vertices, counterclockwise from outside.
 struct Face {
   Vec3 normal;
@@ -361,6 +363,35 @@ class Rounder {
   std::vector<NurbsSurface> out_;
 };
 
+// Normals of a hull's faces of more than this share of its surface: triangles of one plane count together.
+std::vector<Vec3> faces_of_size(const ConvexHull& hull, double share) {
+  std::vector<Vec3> normals;  // as long as twice the areas
+  double whole = 0;
+  for (const auto& t : hull.mesh().triangles) {
+    normals.push_back(facet_normal(hull.mesh(), t));
+    whole += normals.back().norm();
+  }
+  std::stable_sort(normals.begin(), normals.end(),
+                   [](const Vec3& a, const Vec3& b) { return a.squaredNorm() > b.squaredNorm(); });
+  std::vector<std::pair<Vec3, double>> faces;
+  for (size_t k = 0; k < normals.size(); ++k) {
+    const double area = normals[k].norm();
+    if (!(area > 0)) break;
+    const Vec3 n = normals[k] / area;
+    const auto of = std::find_if(faces.begin(), faces.end(), [&](const auto& f) {
+      return f.first.dot(n) > kSameSide && f.first.cross(n).norm() < kSamePlane;
+    });
+    if (of != faces.end())
+      of->second += area;
+    else if (k < kLargestTriangles)
+      faces.emplace_back(n, area);
+  }
+  std::vector<Vec3> out;
+  for (const auto& [n, area] : faces)
+    if (area > share * whole) out.push_back(n);
+  return out;
+}
+
 }  // namespace
 
 std::vector<HalfSpace> facets(const ConvexHull& hull, size_t most, double roundoff) {
@@ -438,6 +469,51 @@ std::vector<std::vector<HalfSpace>> large_faces(const ConvexHull& hull) {
     for (size_t i = 0; i < k; ++i) out.back().push_back(planes[i].space);
   }
   return out;
+}
+
+// Sandwich approximation: the corner furthest from the hull is cut off by the plane that is normal to the way
+// there, which touches the hull; in the end planes go without which no corner is too far.
+std::vector<HalfSpace> enclosing_faces(const ConvexHull& hull, const Vec3& inside, double excess,
+                                       double inward, size_t most) {
+  int vertex = 0;
+  const auto touching = [&](const Vec3& n) {
+    vertex = hull.support(n, vertex);
+    return HalfSpace{n, n.dot(hull.mesh().points[vertex])};
+  };
+  std::vector<HalfSpace> out;
+  for (const Vec3& n : faces_of_size(hull, kSomeSize)) out.push_back(touching(n));
+  const size_t kept = out.size();
+  const Vec3 extent = bounding_box(hull.mesh().points).sizes();
+  for (int k = 0; k < 6; ++k) {  // they bound it, however flat
+    const Vec3 across = Vec3::Unit(k / 2).cwiseQuotient(extent);
+    out.push_back(touching((k & 1 ? -1.0 : 1.0) * across.normalized()));
+  }
+  std::map<std::array<double, 3>, Vec3> ways;  // from corners that were looked at
+  const auto furthest = [&](const std::vector<HalfSpace>& faces) {
+    Vec3 best = Vec3::Zero();
+    for (const Vec3& c : eroded_corners(faces, inside, 0)) {
+      const auto [at, fresh] = ways.try_emplace({c[0], c[1], c[2]});
+      if (fresh) at->second = hull.way(c, 0, vertex);
+      if (at->second.squaredNorm() > best.squaredNorm()) best = at->second;
+    }
+    return best;
+  };
+  for (;;) {
+    const Vec3 way = furthest(out);
+    if (way.norm() <= excess) break;
+    if (out.size() >= most + 6) return {};
+    out.push_back(touching(-way.normalized()));
+  }
+  for (size_t k = out.size(); k-- > kept;) {
+    std::vector<HalfSpace> fewer = out;
+    fewer.erase(fewer.begin() + static_cast<std::ptrdiff_t>(k));
+    try {
+      if (furthest(fewer).norm() <= excess) out = std::move(fewer);
+    } catch (const ShapeError&) {  // the rest is unbounded
+    }
+  }
+  for (size_t k = kept; k < out.size(); ++k) out[k].offset -= inward;
+  return out.size() <= most ? out : std::vector<HalfSpace>();
 }
 
 std::vector<HalfSpace> platonic_solid(const std::string& name, double radius) {

@@ -25,6 +25,12 @@ std::vector<HalfSpace> facets(const ConvexHull& hull, size_t most, double roundo
 // are round; the fewest first, at least four. Empty where no face stands out.
 std::vector<std::vector<HalfSpace>> large_faces(const ConvexHull& hull);
 
+// Half spaces that hold a hull, no corner of their intersection further than `excess` from it: the planes of
+// its faces of some size, and the tangent planes that cut off most, which are then moved by `inward`. Empty
+// when more than `most` are needed.
+std::vector<HalfSpace> enclosing_faces(const ConvexHull& hull, const Vec3& inside, double excess,
+                                       double inward, size_t most);
+
 // Those of a Platonic solid with corners on the sphere of `radius` about the origin: tetrahedron, cube,
 // octahedron, dodecahedron, icosahedron. Empty for another name.
 std::vector<HalfSpace> platonic_solid(const std::string& name, double radius);
