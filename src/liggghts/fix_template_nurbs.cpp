@@ -304,8 +304,9 @@ void FixTemplateNurbs::randomize_single() {
   pti->groupbit = groupbit;
 }
 
-// The host asks each of N templates for room for its share of a batch and N more: with a thousand templates that
-// is a million particles, of which nearly all are never drawn. Those that are drawn are made then and kept.
+// The host asks each of N templates for room for its share of a batch and N more: with a thousand templates
+// that is a million particles, of which nearly all are never drawn. Those that are drawn are made then and
+// kept.
 void FixTemplateNurbs::init_ptilist(int count, const bool, FixPropertyAtom* const release) {
   if (pti_list != nullptr)
     fail_all(FLERR, lmp, std::string(kUser) + ": its list of particles exists already");

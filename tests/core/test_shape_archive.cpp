@@ -12,7 +12,8 @@
 namespace nurbs {
 namespace {
 
-// Round, dented, with poles, flat faces, rulings, a meridian: every table of a shape is filled in one of them.
+// Round, dented, with poles, flat faces, rulings, a meridian: every table of a shape is filled in one of
+// them.
 std::vector<test::ShapePointer> various() {
   std::vector<test::ShapePointer> shapes = test::all_shapes();
   shapes.push_back(make_shape("cylinder", test::cylinder(1, 0.8)));
