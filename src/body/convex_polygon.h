@@ -48,6 +48,12 @@ class SideLines {
   double depth_inside(const Vec2& point) const;  // as above, of one point
 
  private:
+  template <class Archive>
+  friend void archive(Archive& a, SideLines& s) {
+    auto& [x, y, offset] = s;
+    a(x, y, offset);
+  }
+
   std::vector<double> x_, y_, offset_;  // padded, so that several are looked at together
 };
 

@@ -18,6 +18,11 @@ struct SurfacePoint {
 
   bool on_patch() const { return u >= 0 && u <= 1 && v >= 0 && v <= 1; }
 };
+template <class Archive>
+void archive(Archive& a, SurfacePoint& s) {
+  auto& [patch, u, v] = s;
+  a(patch, u, v);
+}
 
 struct DirectionAtlas {
   int cells = 0;                    // per cube edge: (cells + 1)^2 nodes per face, 6 faces
@@ -36,6 +41,11 @@ struct DirectionAtlas {
   Vec3 direction(int node) const;
   int nodes() const { return static_cast<int>(support.size()); }
 };
+template <class Archive>
+void archive(Archive& a, DirectionAtlas& s) {
+  auto& [cells, support, point, where] = s;
+  a(cells, support, point, where);
+}
 
 // The atlas of a shape whose patches, links, bounds and curvatures are done. Milliseconds; 97 kB at 16 cells.
 DirectionAtlas make_atlas(const Shape& shape, int cells);

@@ -19,6 +19,11 @@ struct Ellipsoid {
 
   double least() const { return semi.minCoeff(); }
 };
+template <class Archive>
+void archive(Archive& a, Ellipsoid& s) {
+  auto& [found, axes, semi, root, error] = s;
+  a(found, axes, semi, root, error);
+}
 
 // Of a closed body with inertia over mass `gyration` about its centre of mass, the origin. Proven: in
 // coordinates in which E is the unit ball, the Bernstein coefficients of |x|^2 - w^2, x and w the patch's

@@ -35,12 +35,23 @@ struct FlatFace {
   Vec3 axis_v() const { return normal.cross(axis_u); }
   Vec2 project(const Vec3& x) const { return {axis_u.dot(x), axis_v().dot(x)}; }
 };
+template <class Archive>
+void archive(Archive& a, FlatFace& s) {
+  auto& [normal, axis_u, offset, slack, patch, area, centroid, round, outline, corners, sides, radius,
+         weight] = s;
+  a(normal, axis_u, offset, slack, patch, area, centroid, round, outline, corners, sides, radius, weight);
+}
 
 struct StraightEdge {             // a convex crease; collinear pieces are one
   int ends[2] = {0, 0};           // vertices
   Vec3 direction = Vec3::Zero();  // unit, from the first to the second
   double slack = 0;               // by which the surface may be beside it
 };
+template <class Archive>
+void archive(Archive& a, StraightEdge& s) {
+  auto& [ends, direction, slack] = s;
+  a(ends, direction, slack);
+}
 
 // Straight parameter lines along which the normal is constant: cylinders, cones, rounded edges.
 enum class Ruling : signed char { none, along_u, along_v };
@@ -52,6 +63,11 @@ struct FlatFeatures {
   std::vector<Ruling> ruling;  // per patch; empty when there is none
   bool empty() const { return faces.empty() && edges.empty() && ruling.empty(); }
 };
+template <class Archive>
+void archive(Archive& a, FlatFeatures& s) {
+  auto& [vertices, faces, edges, ruling] = s;
+  a(vertices, faces, edges, ruling);
+}
 
 // A face's patches have all control points within kFlatness of one plane, are joined through links, and lie
 // on the body's convex hull. An outline of at most kOutlinePoints straight sides has exact corners; any other

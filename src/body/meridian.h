@@ -43,6 +43,26 @@ struct Meridian {
 
   bool empty() const { return pieces.empty(); }
 };
+template <class Archive>
+void archive(Archive& a, Meridian::Piece& s) {
+  auto& [degree, r, z, w, speed, first_sector, sectors] = s;
+  a(degree, r, z, w, speed, first_sector, sectors);
+}
+template <class Archive>
+void archive(Archive& a, Meridian::Sector& s) {
+  auto& [patch, arcs_in_u, backwards, degree, x, y, begin, sweep] = s;
+  a(patch, arcs_in_u, backwards, degree, x, y, begin, sweep);
+}
+template <class Archive>
+void archive(Archive& a, Meridian::Place& s) {
+  auto& [piece, t] = s;
+  a(piece, t);
+}
+template <class Archive>
+void archive(Archive& a, Meridian& s) {
+  auto& [pieces, sectors, starts, sector_of, axes, point, error] = s;
+  a(pieces, sectors, starts, sector_of, axes, point, error);
+}
 
 // Of a body of revolution whose joints meet to round-off. `size`: bounding radius. Patches in a plane square
 // to the axis need not be such products: the rest bounds them.

@@ -25,6 +25,11 @@ struct NormalMap {
   std::vector<float> radius;  // per cell, infinite where nothing is promised
   double radius_at(const Vec3& normal) const;
 };
+template <class Archive>
+void archive(Archive& a, NormalMap& s) {
+  auto& [cells, radius] = s;
+  a(cells, radius);
+}
 
 // Of a shape whose patches, links, bounds, dents and curvatures are done, if it has dents or its largest
 // curvature radius exceeds kLongRadius bounding radii; empty for others. From the leaves of `bounds`, whose

@@ -18,6 +18,11 @@ struct ProfileRadii {
   // For all angles within `reach` (rad) of the one of this cosine and sine; 0 where nothing is known.
   double within(double cosine, double sine, double reach) const;
 };
+template <class Archive>
+void archive(Archive& a, ProfileRadii& s) {
+  auto& [least] = s;
+  a(least);
+}
 
 // Of an empty meridian empty. `patches` say which side is outside. About 1 ms.
 ProfileRadii make_profile_radii(const Meridian& meridian, const std::vector<BezierPatch>& patches,

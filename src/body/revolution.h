@@ -16,6 +16,11 @@ struct Revolution {
   Vec3 point = Vec3::Zero();  // on it
   double error = 0;           // no point of the body turns out of it by more than this, a length
 };
+template <class Archive>
+void archive(Archive& a, Revolution& s) {
+  auto& [found, axis, point, error] = s;
+  a(found, axis, point, error);
+}
 
 // Of a closed body about its centre of mass, the origin, and the ellipsoid that it is, if any. Every patch
 // must lie in a plane square to the axis, or have parameter lines of one kind that are circular arcs about

@@ -21,6 +21,11 @@ struct JointDistance {
   double concave = 0;  // largest kink that closes, rad
   bool none() const { return convex == 0 && concave == 0; }
 };
+template <class Archive>
+void archive(Archive& a, JointDistance& s) {
+  auto& [speed, width, convex, concave] = s;
+  a(speed, width, convex, concave);
+}
 
 // At a surface point x with outward normal n:
 //   a ball of radius `inner` that touches at x lies inside the body;

@@ -304,19 +304,24 @@ void FixTemplateNurbs::randomize_single() {
   pti->groupbit = groupbit;
 }
 
+// The host asks each of N templates for room for its share of a batch and N more: with a thousand templates
+// that is a million particles, of which nearly all are never drawn. Those that are drawn are made then and
+// kept.
 void FixTemplateNurbs::init_ptilist(int count, const bool, FixPropertyAtom* const release) {
   if (pti_list != nullptr)
     fail_all(FLERR, lmp, std::string(kUser) + ": its list of particles exists already");
   n_pti_max = count;
   pti_list = static_cast<ParticleToInsert**>(memory->smalloc(count * sizeof(ParticleToInsert*), "pti_list"));
-  for (int i = 0; i < count; ++i)
-    pti_list[i] = new ParticleToInsertNurbs(lmp, model_, random_insertion, release);
+  std::fill(pti_list, pti_list + count, nullptr);
+  release_ = release;
 }
 
 // Called on all ranks when a fix insert/* begins.
 void FixTemplateNurbs::randomize_ptilist(int count, int distribution_groupbit, int order) {
   bodies_->begin_insertion(max_rad());
   for (int i = 0; i < count; ++i) {
+    if (pti_list[i] == nullptr)
+      pti_list[i] = new ParticleToInsertNurbs(lmp, model_, random_insertion, release_);
     fill(pti_list[i]);
     pti_list[i]->groupbit = groupbit | distribution_groupbit;
     pti_list[i]->distorder = order;

@@ -92,7 +92,8 @@ class FixTemplateNurbs : public FixTemplateSphere {
 
   AtomVecNurbs* bodies_;
   NurbsTemplate model_;
-  int seed_;  // as given
+  int seed_;                            // as given
+  FixPropertyAtom* release_ = nullptr;  // what the particles of the list are told of their release
 };
 
 }  // namespace LAMMPS_NS

@@ -12,7 +12,7 @@
 #include <iterator>
 #include <string_view>
 #include <thread>
-#include <unordered_map>
+#include <utility>
 
 #include "comm.h"
 #include "io/shape_file.h"
@@ -40,12 +40,14 @@ bool take(const std::string& data, std::size_t& at, std::string& item) {
   return true;
 }
 
-// Gives rank 0's string to all ranks.
-void broadcast(std::string& data, MPI_Comm world) {
+// Gives one rank's string to all ranks.
+void broadcast(std::string& data, MPI_Comm world, int from = 0) {
+  constexpr std::uint64_t kMost = 1u << 30;  // MPI counts in int
   std::uint64_t size = data.size();
-  MPI_Bcast(&size, 1, MPI_UINT64_T, 0, world);
+  MPI_Bcast(&size, 1, MPI_UINT64_T, from, world);
   data.resize(size);
-  MPI_Bcast(data.data(), static_cast<int>(size), MPI_CHAR, 0, world);
+  for (std::uint64_t at = 0; at < size; at += kMost)
+    MPI_Bcast(data.data() + at, static_cast<int>(std::min(kMost, size - at)), MPI_CHAR, from, world);
 }
 
 // The whole content of a file; false when it can't be read.
@@ -91,14 +93,27 @@ std::vector<std::size_t> ShapeLibrary::first_of_content() const {
   return first;
 }
 
-// Every rank makes all shapes, on the cores that the ranks of its machine leave it: a thread takes the next
-// file until none is left. What comes out does not depend on who made it.
-std::vector<ShapeLibrary::Made> ShapeLibrary::make(const std::vector<std::size_t>& first) const {
+// Which rank makes each: the longest files first, as they take longest, in turns.
+std::vector<int> ShapeLibrary::deal(const std::vector<std::size_t>& first) const {
+  std::vector<std::size_t> order;
+  for (std::size_t k = 0; k < first.size(); ++k)
+    if (first[k] == k) order.push_back(k);
+  std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) {
+    return sources_[a].text.size() > sources_[b].text.size();
+  });
+  std::vector<int> maker(first.size(), -1);
+  for (std::size_t k = 0; k < order.size(); ++k) maker[order[k]] = static_cast<int>(k % comm->nprocs);
+  return maker;
+}
+
+// This rank's share, on the cores that the ranks of its machine leave it: a thread takes the next file until
+// none is left. What comes out does not depend on who made it.
+std::vector<ShapeLibrary::Made> ShapeLibrary::make(const std::vector<std::size_t>& mine) const {
   std::vector<Made> made(sources_.size());
   std::atomic<std::size_t> next{0};
   const auto work = [&] {
-    for (std::size_t k; (k = next++) < sources_.size();) {
-      if (first[k] != k) continue;
+    for (std::size_t n; (n = next++) < mine.size();) {
+      const std::size_t k = mine[n];
       try {
         auto content = nurbs::parse_shape(sources_[k].text, sources_[k].file);
         made[k].shape = nurbs::make_shape(sources_[k].name, std::move(content.surfaces), content.gyration,
@@ -115,22 +130,47 @@ std::vector<ShapeLibrary::Made> ShapeLibrary::make(const std::vector<std::size_t
   MPI_Comm_free(&machine);
   const std::size_t cores = std::max<std::size_t>(std::thread::hardware_concurrency() / ranks, 1);
   std::vector<std::thread> others;
-  for (std::size_t k = 1; k < std::min(cores, sources_.size()); ++k) others.emplace_back(work);
+  for (std::size_t k = 1; k < std::min(cores, mine.size()); ++k) others.emplace_back(work);
   work();
   for (std::thread& other : others) other.join();
   return made;
 }
 
+// From the rank that made it to all: a shape, or what was wrong.
+void ShapeLibrary::pass_on(int maker, Made& made) const {
+  if (comm->nprocs == 1) return;
+  std::string data;
+  if (comm->me == maker) {
+    append(data, made.failure);
+    append(data, made.failure.empty() ? nurbs::pack(*made.shape) : "");
+    for (const std::string& warning : made.warnings) append(data, warning);
+  }
+  broadcast(data, world, maker);
+  if (comm->me == maker) return;
+  std::size_t at = 0;
+  std::string item;
+  take(data, at, made.failure);
+  take(data, at, item);
+  if (made.failure.empty()) made.shape = nurbs::unpack(item);
+  while (take(data, at, item)) made.warnings.push_back(item);
+}
+
 void ShapeLibrary::build() {
   shapes_.clear();
   rotors_.clear();
+  numbers_.clear();
   const std::vector<std::size_t> first = first_of_content();
-  std::vector<Made> made = make(first);
+  const std::vector<int> maker = deal(first);
+  std::vector<std::size_t> mine;
+  for (std::size_t k = 0; k < maker.size(); ++k)
+    if (maker[k] == comm->me) mine.push_back(k);
+  std::vector<Made> made = make(mine);
   for (std::size_t k = 0; k < sources_.size(); ++k) {
-    const Source& source = sources_[k];
-    if (number_of(source.name) != 0)
+    Source& source = sources_[k];
+    if (!numbers_.emplace(source.name, static_cast<int>(k + 1)).second)
       nurbs_host::warn(FLERR, lmp,
                        "Two shapes are named " + source.name + "; that name means the first of them");
+    if (first[k] == k) pass_on(maker[k], made[k]);
     const std::string& what = made[k].failure;
     if (!what.empty()) {
       const bool names_file = what.find(source.file) != std::string::npos;
@@ -140,6 +180,7 @@ void ShapeLibrary::build() {
     for (const std::string& warning : made[k].warnings)
       nurbs_host::warn(FLERR, lmp, "Shape file " + source.file + ": " + warning);
     rotors_.push_back(nurbs::make_rotor(shapes_.back()->principal_gyration, shapes_.back()->principal_axes));
+    if (comm->me != 0) source.text = std::string();
   }
 }
 
@@ -189,9 +230,8 @@ void ShapeLibrary::read_restart(FILE* file) {
 }
 
 int ShapeLibrary::number_of(const std::string& name) const {
-  for (int i = 0; i < count(); ++i)
-    if (sources_[i].name == name) return i + 1;
-  return 0;
+  const auto found = numbers_.find(name);
+  return found == numbers_.end() ? 0 : found->second;
 }
 
 int ShapeLibrary::require(const std::string& user, const std::string& name) const {

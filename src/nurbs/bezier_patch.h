@@ -20,6 +20,11 @@ struct BezierPatch {
   const Vec4& point(int i, int j) const { return points[static_cast<size_t>(i) * (degree_v + 1) + j]; }
   Vec4& point(int i, int j) { return points[static_cast<size_t>(i) * (degree_v + 1) + j]; }
 };
+template <class Archive>
+void archive(Archive& a, BezierPatch& s) {
+  auto& [degree_u, degree_v, rational, points] = s;
+  a(degree_u, degree_v, rational, points);
+}
 
 // Position and partial derivatives with respect to the patch parameters.
 struct Jet1 {

@@ -20,6 +20,11 @@ struct NurbsSurface {
   const Vec4& point(int i, int j) const { return points[static_cast<size_t>(i) * size_v + j]; }
   Vec4& point(int i, int j) { return points[static_cast<size_t>(i) * size_v + j]; }
 };
+template <class Archive>
+void archive(Archive& a, NurbsSurface& s) {
+  auto& [degree_u, degree_v, knots_u, knots_v, size_u, size_v, points] = s;
+  a(degree_u, degree_v, knots_u, knots_v, size_u, size_v, points);
+}
 
 // What is wrong with the numbers of a surface, as one phrase with the offending value and its allowed range;
 // empty when it can be evaluated. Checks degrees, counts, knots, weights and points, in that order.

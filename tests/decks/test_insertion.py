@@ -170,6 +170,22 @@ class WhatIsInserted(Decks):
         self.assertEqual(run.thermo["Atoms"][-1], 10000)
         self.assertLess(run.thermo["CPU"][-1], 20)  # 1 s on an idle core
 
+    def test_many_templates_take_no_memory_each_for_all(self):
+        """The host asks each of 500 for room for 500 particles and more: 160 MB, were they all made."""
+        primes = [n for n in range(10007, 16000, 2) if all(n % d for d in range(3, 127, 2))][:500]
+        text = header() + "".join(template("density constant 1 shape ball scale constant 0.2", f"t{k}", seed)
+                                  for k, seed in enumerate(primes))
+        text += "fix all all particledistribution/discrete 32452843 500 " + " ".join(f"t{k} 0.002" for k in range(500))
+        text += "\n" + REGION + insert_pack("particles_in_region 1000", "all")
+        text += "shell sh memory.sh\nthermo_style custom step atoms\nrun 1\nshell sh memory.sh\n"
+        script = ("p=$PPID\n"
+                  "until grep -q liggghts /proc/$p/comm; do read -r _ _ _ p _ < /proc/$p/stat; done\n"
+                  "grep VmHWM /proc/$p/status\n")
+        run = self.run_deck(text, more={"memory.sh": script})
+        before, after = (int(kb) for kb in re.findall(r"VmHWM:\s+(\d+) kB", run.screen))
+        self.assertEqual(run.thermo["Atoms"][-1], 1000)
+        self.assertLess(after - before, 40000)
+
     def test_create_attribute_of_other_fixes(self):
         """A property given to what is inserted arrives."""
         text = header() + "fix tag all property/atom tag scalar yes no no 0.\n" + PLAIN + REGION
