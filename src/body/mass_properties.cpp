@@ -91,6 +91,20 @@ Moments integrate_adaptively(const BezierPatch& patch, const Cell& cell, const G
   return sum;
 }
 
+// The same patch in other parameters, u -> c u / (1 + (c - 1) u) and v likewise, in which its corners weigh
+// about the same: weights of 1e6 : 1 crowd it into 1e-6 of its parameters, which no node of a rule meets and
+// halving finds by luck.
+BezierPatch with_even_weights(BezierPatch patch) {
+  const int p = patch.degree_u, q = patch.degree_v;
+  const auto w = [&](int i, int j) { return std::log(patch.point(i, j)[3]); };
+  const double u = 0.5 * (w(0, 0) - w(p, 0) + w(0, q) - w(p, q)) / p,
+               v = 0.5 * (w(0, 0) - w(0, q) + w(p, 0) - w(p, q)) / q;
+  if (std::max(std::abs(p * u), std::abs(q * v)) < std::log(kUnevenWeights)) return patch;
+  for (int i = 0; i <= p; ++i)
+    for (int j = 0; j <= q; ++j) patch.point(i, j) *= std::exp(i * u + j * v);
+  return patch;
+}
+
 // Points per direction: exact for the second moments of a polynomial patch (degree 5 p - 1), a start for
 // others.
 int rule_size(const BezierPatch& patch) {
@@ -132,7 +146,10 @@ MassProperties from_moments(const Moments& m, const Vec3& reference) {
 
 }  // namespace
 
-MassProperties integrate_mass(const std::vector<BezierPatch>& patches) {
+MassProperties integrate_mass(const std::vector<BezierPatch>& given) {
+  std::vector<BezierPatch> patches;
+  for (const BezierPatch& patch : given)
+    patches.push_back(patch.rational ? with_even_weights(patch) : patch);
   const Vec3 reference = middle_of_box(patches);
   std::vector<GaussRule> rules(5 * kMaxDegree + 1);
   for (const BezierPatch& patch : patches) {
