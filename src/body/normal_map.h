@@ -39,8 +39,8 @@ struct NormalMap {
 };
 template <class Archive>
 void archive(Archive& a, NormalMap& s) {
-  auto& [cells, radius] = s;
-  a(cells, radius);
+  auto& [cells, radius, block, close] = s;
+  a(cells, radius, block, close);
 }
 
 // Of a shape whose patches, links, bounds, dents and curvatures are done, if it has dents or its largest

@@ -3,7 +3,6 @@
 // particle of that shape shares it.
 #pragma once
 
-#include <algorithm>
 #include <array>
 #include <cstdint>
 #include <memory>
@@ -176,10 +175,6 @@ struct Shape {
 
   // Balls inside the body over directions.
   const InnerMap& inner_map() const { return lazy_inner_map.of(*this); }
-  // Of the largest ball that is known to roll inside the body.
-  double rolling_radius() const {
-    return std::max(std::min(curvature.min_radius, inner_radius), core.radius);
-  }
   // Whether a local maximum of d . x may be no global one.
   bool dented() const { return support_excess > kRoundoff * bounding_radius; }
 };

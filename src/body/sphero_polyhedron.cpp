@@ -87,14 +87,16 @@ class Finder {
     for (const BezierPatch& patch : shape_.patches)
       for (const Vec4& p : patch.points) {
         const Vec3 x = p.head<3>() / p[3];
-        const auto same = [&](const Vec3& y) {
+        const auto near = std::find_if(out.points.begin(), out.points.end(), [&](const Vec3& y) {
           return (x - y).norm() <= kSamePoint * shape_.bounding_radius;
-        };
-        if (std::any_of(out.points.begin(), out.points.end(), same)) continue;
+        });
+        if (near != out.points.end()) {
+          out.error = std::max(out.error, (x - *near).norm());
+          continue;
+        }
         if (out.points.size() == kMostPoints) return {};
         out.points.push_back(x);
       }
-    out.error = kSamePoint * shape_.bounding_radius;
     return out;
   }
 

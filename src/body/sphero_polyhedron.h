@@ -28,6 +28,12 @@ struct SpheroPolyhedron {
   }
 };
 
+template <class Archive>
+void archive(Archive& a, SpheroPolyhedron& s) {
+  auto& [points, radius, error] = s;
+  a(points, radius, error);
+}
+
 // Of a shape of which all but the search tables is done. Found by positions:
 //   * The body is in it: its patches are planar, or straight one way between edges that they share with parts
 //     of balls, or parts of balls of `radius` about one of the points, proven from Bernstein coefficients.

@@ -103,7 +103,7 @@ class CellSearch {
 
   Side side(const Shape& shape, double scale, double sign, const Mat3& turn, const Vec3& centre) const {
     Side s{&shape, scale, sign, turn, centre, false, false, 0, 0, Vec3::Zero(), Vec3::Zero()};
-    s.sphero = shape.core.found() && scale * shape.core.error <= kCoreError * tolerance_;
+    s.sphero = PairFrame::is_swept(shape, scale, tolerance_);
     s.revolved = !s.sphero && shape.revolution.found && !shape.meridian.empty() && !shape.proofs.sphere;
     if (s.sphero) {
       s.ball = scale * shape.core.radius;

@@ -2,6 +2,8 @@
 // Solving there keeps the digits of a pair far from the lab's origin, and gives every rank the same bits.
 #pragma once
 
+#include <algorithm>
+
 #include "body/support.h"
 #include "contact/contact.h"
 #include "nurbs/tolerances.h"
@@ -34,10 +36,15 @@ struct PairFrame {
     return inner_maps ? shape.inner_map() : none;
   }
 
-  // Whether points and balls stand for both, to little more than round-off of the tolerance.
-  bool both_sphero_polyhedra(double tolerance) const {
-    return a->core.found() && b->core.found() &&
-           scale_a * a->core.error + scale_b * b->core.error <= kCoreError * tolerance;
+  // Whether points and a ball stand for a body of the pair, to little more than round-off of the tolerance.
+  static bool is_swept(const Shape& shape, double scale, double tolerance) {
+    return shape.core.found() && scale * shape.core.error <= kCoreError * tolerance;
+  }
+  // Radius of a ball that rolls inside. None that does is larger than the largest inside (a sphere's radii
+  // are bounds of it).
+  static double rolling_ball(const Shape& shape, double scale, double tolerance) {
+    const double least = std::min(shape.curvature.min_radius, shape.inner_radius);
+    return scale * (is_swept(shape, scale, tolerance) ? std::max(least, shape.core.radius) : least);
   }
 
   Vec3 place_a(const Vec3& s) const { return scale_a * s; }

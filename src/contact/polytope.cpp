@@ -70,19 +70,20 @@ class Search {
   // `points`: of two sphero-polyhedra nothing else is left.
   Search(const PairFrame& pair, double tolerance, double joggle, bool points)
       : pair_(pair), tolerance_(tolerance), joggle_(joggle), hull_(kSliver * pair.reach) {
-    core_error_ = pair.scale_a * pair.a->core.error + pair.scale_b * pair.b->core.error;
-    if (points && pair.both_sphero_polyhedra(tolerance)) {
+    if (PairFrame::is_swept(*pair.a, pair.scale_a, tolerance)) core_a_ = &pair.a->core;
+    if (PairFrame::is_swept(*pair.b, pair.scale_b, tolerance)) core_b_ = &pair.b->core;
+    if (core_a_) core_error_ += pair.scale_a * core_a_->error;
+    if (core_b_) core_error_ += pair.scale_b * core_b_->error;
+    shrink_a_ = PairFrame::rolling_ball(*pair.a, pair.scale_a, tolerance);
+    shrink_b_ = PairFrame::rolling_ball(*pair.b, pair.scale_b, tolerance);
+    points_ = points && core_a_ && core_b_;
+    if (points_) {
       // The hull is their points' difference's, as exact as they are.
-      core_a_ = &pair.a->core;
-      core_b_ = &pair.b->core;
       shrink_a_ = pair.scale_a * core_a_->radius;
       shrink_b_ = pair.scale_b * core_b_->radius;
       shrink_ = shrink_a_ + shrink_b_;
       return;
     }
-    // No ball that rolls inside is larger than the largest inside (a sphere's radii are bounds of it).
-    shrink_a_ = pair.scale_a * pair.a->rolling_radius();
-    shrink_b_ = pair.scale_b * pair.b->rolling_radius();
     (shrink_a_ < shrink_b_ ? shrink_a_ : shrink_b_) *= kCoreShare;
     shrink_ = shrink_a_ + shrink_b_;
   }
@@ -187,7 +188,7 @@ class Search {
         stalled_ = true;
         return;
       }
-      if (!core_a_ && hull_.points() >= before_cores_) {
+      if (!points_ && hull_.points() >= before_cores_) {
         before_cores_ = hull_.points() + kBetweenCores;
         cover_by_cores();
       }
@@ -222,7 +223,7 @@ class Search {
     r.points.b = b - shrink_b_ * direction_;
     r.points.on_a = w.on_a;
     r.points.on_b = w.on_b;
-    if (core_a_) {
+    if (points_) {
       r.points.on_a = find_hull_support(*pair_.a, direction_).where;
       r.points.on_b = find_hull_support(*pair_.b, pair_.direction_on_b(direction_)).where;
     }
@@ -247,13 +248,13 @@ class Search {
     const int v = hull_.points();
     if (v == kHullVertices) return -1;
     witness_[v].cap = false;
-    if (core_a_) return query_cores(d, v);
+    if (points_) return query_points(d, v);
     const auto [sa, sb] = hull_supports(pair_, d, near < 0 ? nullptr : &witness_[near].on_a,
                                         near < 0 ? nullptr : &witness_[near].on_b, tolerance_);
     Witness& w = witness_[v];
     // The centres of balls that touch there from inside lie in the cores, exactly.
-    w.a = cored(*pair_.a, pair_.scale_a, sa, d, shrink_a_);
-    w.b = pair_.offset + pair_.turn * cored(*pair_.b, pair_.scale_b, sb, pair_.direction_on_b(d), shrink_b_);
+    w.a = cored(core_a_, pair_.scale_a, sa, d, shrink_a_);
+    w.b = pair_.offset + pair_.turn * cored(core_b_, pair_.scale_b, sb, pair_.direction_on_b(d), shrink_b_);
     w.d = d;
     w.on_a = sa.where;
     w.on_b = sb.where;
@@ -262,14 +263,14 @@ class Search {
 
   // Of a body in its own axes, lengths of the lab: where the core, less a ball of radius `shrink`, has its
   // support along unit e. Of a sphero-polyhedron that does not rest on the surface's normal.
-  static Vec3 cored(const Shape& shape, double scale, const Support& on, const Vec3& e, double shrink) {
-    if (!shape.core.found() || shrink > scale * shape.core.radius)
-      return scale * on.point - shrink * on.normal;
-    return scale * shape.core.points[shape.core.support(e)] + (scale * shape.core.radius - shrink) * e;
+  static Vec3 cored(const SpheroPolyhedron* core, double scale, const Support& on, const Vec3& e,
+                    double shrink) {
+    if (!core || shrink > scale * core->radius) return scale * on.point - shrink * on.normal;
+    return scale * core->points[core->support(e)] + (scale * core->radius - shrink) * e;
   }
 
   // The same of two sphero-polyhedra.
-  int query_cores(const Vec3& d, int v) {
+  int query_points(const Vec3& d, int v) {
     const Vec3 on_b = pair_.direction_on_b(d);
     Witness& w = witness_[v];
     w.a = pair_.place_a(core_a_->points[core_a_->support(d)]);
@@ -334,7 +335,7 @@ class Search {
   // W_A + W_B of the cores at the supports of point v, in the tangent plane of d spanned by t and s: what
   // p(d) of the cores bends by there, but for p itself.
   bool core_turn(int v, const Vec3& d, const Vec3& t, const Vec3& s, Mat2* turn) const {
-    if (core_a_) return false;
+    if (points_) return false;
     Mat2 wa, wb;
     const Witness& w = witness_[v];
     const Mat3 back = pair_.turn.transpose();
@@ -372,7 +373,7 @@ class Search {
   //     p >= y0 - s' t + (m0 - y0) t^2 / 2 (1 - t^2 / 12) - rho t^3 / 6,
   // the factor only where m0 > y0.
   double cover(int v) {
-    if (core_a_) return 0;
+    if (points_) return 0;
     const Witness w = witness_[v];
     const Vec3 d = w.d, t = d.unitOrthogonal(), s = d.cross(t), g = hull_.point(v);
     const double level = -lower_ - kCapDepth * tolerance_ - shrink_;
@@ -726,8 +727,9 @@ class Search {
   const PairFrame& pair_;
   double tolerance_, joggle_;
   double shrink_a_, shrink_b_, shrink_;
-  const SpheroPolyhedron *core_a_ = nullptr, *core_b_ = nullptr;  // both, or none
+  const SpheroPolyhedron *core_a_ = nullptr, *core_b_ = nullptr;  // that serve
   double core_error_ = 0;
+  bool points_ = false;  // are all that is left
   double valid_ = M_PI;  // what the cores hold for: directions within it of the middle
   Vec3 middle_ = Vec3::Zero();
   double lower_ = -kFarAway, upper_ = kFarAway, near_ = -kFarAway;

@@ -40,8 +40,10 @@ struct View {
   double mate_error = 0;   // what the mate turns out of itself by, a length of its shape
   double ball = 0;         // that rolls inside M, whose points are those of its core, the ball's centres ...
   double ball_k = 0;       // ... and inside K
+  const SpheroPolyhedron* swept = nullptr;  // M, if it is one
+  double error = 0;                         // of those that are
 
-  View(const PairFrame& pair, bool k_is_a, bool core) {
+  View(const PairFrame& pair, bool k_is_a, bool core, double tolerance) {
     sign = k_is_a ? 1 : -1;
     k = k_is_a ? pair.a : pair.b;
     m = k_is_a ? pair.b : pair.a;
@@ -67,8 +69,11 @@ struct View {
     circles = m->revolution.found && sine < kNearAxis;
     if (circles) tilt = sine;
     if (!core) return;
-    ball = kCore * scale_m * m->rolling_radius();
-    ball_k = kCore * scale_k * k->rolling_radius();
+    ball = kCore * PairFrame::rolling_ball(*m, scale_m, tolerance);
+    ball_k = kCore * PairFrame::rolling_ball(*k, scale_k, tolerance);
+    if (PairFrame::is_swept(*m, scale_m, tolerance)) swept = &m->core;
+    for (const auto& [shape, scale] : {std::pair(m, scale_m), std::pair(k, scale_k)})
+      if (PairFrame::is_swept(*shape, scale, tolerance)) error += scale * shape->core.error;
   }
   Vec3 across(const Vec3& x) const { return x - axis.dot(x) * axis; }
 };
@@ -178,14 +183,13 @@ class RingSearch {
  public:
   // `core`: of the bodies, and the balls that roll inside them, instead of the bodies.
   RingSearch(const PairFrame& pair, bool k_is_a, bool core, double tolerance)
-      : pair_(pair), view_(pair, k_is_a, core), tolerance_(tolerance) {
+      : pair_(pair), view_(pair, k_is_a, core, tolerance), tolerance_(tolerance) {
     tangent_ = view_.axis.unitOrthogonal();
     second_ = view_.axis.cross(tangent_);
     noise_ = 2 * kRoundoff *
                  (view_.scale_k * view_.k->bounding_radius + view_.scale_m * view_.m->bounding_radius) +
              view_.scale_k * (view_.k->revolution.error + view_.k->meridian.error) +
-             (view_.circles ? view_.scale_m * view_.mate_error : 0.0) + view_.scale_k * view_.k->core.error +
-             view_.scale_m * view_.m->core.error;
+             (view_.circles ? view_.scale_m * view_.mate_error : 0.0) + view_.error;
   }
 
   bool run(bool last, PolytopeResult* result) {
@@ -285,10 +289,9 @@ class RingSearch {
 
   // Of the mate in its own axes: its core's support along unit `own`.
   Vec3 mate_core(const Support& on, const Vec3& own) const {
-    const SpheroPolyhedron& core = view_.m->core;
-    const double left = core.found() ? view_.scale_m * core.radius - view_.ball : -1;
+    const double left = view_.swept ? view_.scale_m * view_.swept->radius - view_.ball : -1;
     if (left < 0) return view_.scale_m * on.point - view_.ball * on.normal;
-    return view_.scale_m * core.points[core.support(own)] + left * own;
+    return view_.scale_m * view_.swept->points[view_.swept->support(own)] + left * own;
   }
 
   // Circles are kept by the angle they were asked for. Chosen are those asked for in a sector, and some
@@ -647,7 +650,9 @@ bool search_rings(const PairFrame& pair, double tolerance, bool last, PolytopeRe
     const Shape& k = k_is_a ? *pair.a : *pair.b;
     if (!k.revolution.found || k.proofs.sphere) continue;
     const Shape& mate = k_is_a ? *pair.b : *pair.a;
-    const bool round = mate.rolling_radius() > 0 && !mate.proofs.sphere;
+    const bool round =
+        PairFrame::rolling_ball(mate, 1, tolerance / (k_is_a ? pair.scale_b : pair.scale_a)) > 0 &&
+        !mate.proofs.sphere;
     // Circles of a mate about nearly the same axis serve better, unless it ends in spheres.
     const Vec3 axis = k_is_a ? Vec3(pair.turn * mate.revolution.axis) : mate.revolution.axis,
                own = k_is_a ? k.revolution.axis : Vec3(pair.turn * k.revolution.axis);

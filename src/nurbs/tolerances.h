@@ -40,13 +40,13 @@ constexpr double kSmallKink = 0.1;        // rad: larger ones are edges, not imp
 // --- mass
 constexpr double kMomentTolerance = 1e-12;  // of each moment, per integration cell
 constexpr int kMaxHalvings = 10;            // of a cell; reached only at a singular patch corner
-constexpr double kUnevenWeights = 10;       // ratio of a patch's ends, on average, from which it is integrated in
-                                            // parameters in which they weigh the same
-constexpr double kMomentRoundoff = 1e-13;   // relative: products of inertia and differences of moments below
-                                            // this are none; integrated moments are good to some 1e-15
-constexpr double kGivenAsymmetry = 1e-12;   // relative, of a gyration tensor given by the user
-constexpr double kGivenExcess = 1e-9;       // by which its largest moment may exceed the sum of the others:
-                                            // a rod's or plate's, written with ten digits
+constexpr double kUnevenWeights = 10;  // ratio of a patch's ends, on average, from which it is integrated in
+                                       // parameters in which they weigh the same
+constexpr double kMomentRoundoff = 1e-13;  // relative: products of inertia and differences of moments below
+                                           // this are none; integrated moments are good to some 1e-15
+constexpr double kGivenAsymmetry = 1e-12;  // relative, of a gyration tensor given by the user
+constexpr double kGivenExcess = 1e-9;      // by which its largest moment may exceed the sum of the others:
+                                           // a rod's or plate's, written with ten digits
 
 // --- radii
 constexpr double kBoundWidth = 1e-6;          // of the squared radius, at which a bound is tight enough

@@ -100,6 +100,20 @@ TEST(MassProperties, BoxIsIntegratedToRoundOff) {
   }
 }
 
+// The same surface, u -> c u / (1 + (c - 1) u) and v likewise: at 1e3 all of a patch crowds into a thousandth
+// of its parameters, which quadrature there missed silently.
+TEST(MassProperties, UnevenWeights) {
+  Random random(7);
+  const Vec3 a(1, 2, 1.5);
+  for (const double c : {1e-3, 0.1, 30.0, 1e3}) {
+    std::vector<NurbsSurface> body = exact_ellipsoid(a);
+    for (NurbsSurface& s : body)
+      for (int i = 0; i < s.size_u; ++i)
+        for (int j = 0; j < s.size_v; ++j) s.point(i, j) *= std::pow(c, i) * std::pow(c, -0.5 * j);
+    expect_mass(body, ellipsoid(a), random, 1e-10);
+  }
+}
+
 TEST(MassProperties, InwardPatchesGiveNegativeVolume) {
   std::vector<NurbsSurface> body = exact_ellipsoid({1, 2, 3});
   const double volume = integrate_mass(split_all(body)).volume;

@@ -1,0 +1,127 @@
+// Sphero-polyhedra: found where bodies are some, their supports as the surfaces' own, and contacts of two
+// against closed forms.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <vector>
+
+#include "body/sphero_polyhedron.h"
+#include "body/support.h"
+#include "contact/pair_search.h"
+#include "io/pair_case.h"
+#include "shapes/primitives.h"
+#include "shapes/revolved.h"
+#include "shapes/rounded_polyhedron.h"
+#include "support/cases.h"
+#include "support/least_overlap.h"
+#include "support/random.h"
+
+namespace nurbs {
+namespace {
+
+using test::Random;
+using Body = std::shared_ptr<const Shape>;
+
+Body rounded(const std::string& solid, double radius) {
+  return make_shape(solid, rounded_polyhedron(platonic_solid(solid, 1), Vec3::Zero(), radius));
+}
+
+void expect_supports(const Shape& shape, size_t points, double radius) {
+  const SpheroPolyhedron& core = shape.core;
+  ASSERT_EQ(core.points.size(), points) << shape.name;
+  EXPECT_NEAR(core.radius, radius, 1e-12 * shape.bounding_radius);
+  EXPECT_LT(core.error, 1e-12 * shape.bounding_radius);
+  for (const Vec3& d : test::spiral(2000)) {
+    const double h = d.dot(core.points[core.support(d)]) + core.radius;
+    EXPECT_NEAR(find_hull_support(shape, d).h, h, 2e-13 * shape.bounding_radius) << shape.name;
+  }
+}
+
+TEST(SpheroPolyhedron, of_bodies_that_are_some) {
+  expect_supports(*make_shape("capsule", capsule(0.5, 2)), 2, 0.5);
+  expect_supports(*make_shape("needle", capsule(0.001, 2)), 2, 0.001);
+  expect_supports(*make_shape("rounded-box", rounded_box({1, 0.7, 0.4}, 0.1)), 8, 0.1);
+  expect_supports(*make_shape("plate", rounded_box({1, 1, 0.01}, 0.002)), 8, 0.002);
+  expect_supports(*make_shape("box", box({1, 0.7, 0.4})), 8, 0);
+  expect_supports(*rounded("tetrahedron", 0.1), 4, 0.1);
+  expect_supports(*rounded("dodecahedron", 0.05), 20, 0.05);
+  expect_supports(*rounded("icosahedron", 1e-4), 12, 1e-4);
+}
+
+TEST(SpheroPolyhedron, of_no_others) {
+  EXPECT_FALSE(make_shape("ellipsoid", exact_ellipsoid({1, 0.8, 0.6}))->core.found());
+  EXPECT_FALSE(make_shape("tablet", tablet(1, 1, 0.2))->core.found());
+  EXPECT_FALSE(make_shape("lens", lens(1, 2, 0.1))->core.found());
+  EXPECT_FALSE(make_shape("egg", egg(1, 0.9, 0.5))->core.found());
+  EXPECT_FALSE(make_shape("pebble", pebble())->core.found());
+  // A cap that is a spheroid's.
+  std::vector<NurbsSurface> body = capsule(0.5, 2);
+  for (NurbsSurface& s : body)
+    for (Vec4& p : s.points)
+      if (p[2] > 1.0001 * p[3]) p[2] = p[3] + (1 + 1e-7) * (p[2] - p[3]);
+  EXPECT_FALSE(make_shape("almost", std::move(body))->core.found());
+}
+
+// Distance of two segments, by a search that knows nothing else: convex in both parameters.
+double segments_apart(const Vec3& p, const Vec3& u, const Vec3& q, const Vec3& v) {
+  const double a = u.dot(u), b = u.dot(v), c = v.dot(v);
+  const Vec3 w = p - q;
+  double best = 1e300, t = 0, s = 0;
+  const auto consider = [&](double x, double y) {
+    x = std::clamp(x, -1.0, 1.0);
+    y = std::clamp((w + x * u).dot(v) / c, -1.0, 1.0);
+    x = std::clamp((q + y * v - p).dot(u) / a, -1.0, 1.0);
+    y = std::clamp((w + x * u).dot(v) / c, -1.0, 1.0);
+    const double d = (w + x * u - y * v).norm();
+    if (d < best) best = d, t = x, s = y;
+  };
+  const double det = a * c - b * b;
+  if (det > 1e-12 * a * c) consider((b * w.dot(v) - c * w.dot(u)) / det, 0);
+  for (const double x : {-1.0, 1.0}) consider(x, 0);
+  for (int k = 0; k <= 20; ++k) consider(0.1 * k - 1, 0);
+  return best;
+}
+
+// Capsules whose segments miss each other by anything down to round-off: the depth is the sum of the radii,
+// less that distance.
+TEST(SpheroPolyhedron, capsules_against_segments) {
+  const Body body = make_shape("capsule", capsule(0.3, 2));
+  const double radius = body->core.radius;
+  Random random(5);
+  for (int k = 0; k < 400; ++k) {
+    const Particle a{body.get(), 1, Vec3::Zero(), random.turn()};
+    Particle b{body.get(), random.log_uniform(0.5, 2), Vec3::Zero(), random.turn()};
+    const auto end = [](const Particle& p) -> Vec3 { return p.q * (p.scale * p.shape->core.points[0]); };
+    const Vec3 u = end(a), v = end(b), across = u.cross(v).normalized();
+    const double apart = k % 8 ? random.log_uniform(1e-12, 0.5) : 0;
+    b.x = apart * across + random.uniform(-0.8, 0.8) * u - random.uniform(-0.8, 0.8) * v;
+    double memory[kPairMemorySize] = {0};
+    const ContactResult r = find_contact(a, b, ContactSettings(), memory);
+    EXPECT_EQ(r.status, Status::converged) << k << ", segments " << apart << " apart";
+    EXPECT_NEAR(r.gap, segments_apart(a.x, u, b.x, v) - (1 + b.scale) * radius, 3e-9) << k;
+  }
+}
+
+// Left open, with brackets of 1e-8 to 1e-6, by hulls and rings that took enclosed least radii for the balls'.
+TEST(SpheroPolyhedron, saved_pairs) {
+  for (const char* name : {"capsule-in-conic", "capsule-on-conic-axis", "capsule-at-reuleaux-saddle",
+                           "twin-rounded-boxes", "conic-twins-at-saddle"}) {
+    const PairCase c = read_pair_case(test::case_file(name));
+    double memory[kPairMemorySize] = {0};
+    const ContactResult r = find_contact(c.a, c.b, c.settings, memory);
+    EXPECT_EQ(r.status, Status::converged) << name;
+    const auto overlap = [&](const Vec3& d) {
+      return c.a.scale * find_hull_support(*c.a.shape, c.a.q.conjugate() * d).h +
+             c.b.scale * find_hull_support(*c.b.shape, c.b.q.conjugate() * -d).h - d.dot(c.b.x - c.a.x);
+    };
+    Random random(3);
+    const double size =
+                     std::min(c.a.scale * c.a.shape->bounding_radius, c.b.scale * c.b.shape->bounding_radius),
+                 least = test::least_overlap(overlap, test::spiral(4000), test::Compass(), random);
+    EXPECT_GT(least, -r.gap - 1.1e-9 * size) << name;
+    EXPECT_NEAR(overlap(r.normal), -r.gap, 1.1e-9 * size) << name;
+  }
+}
+
+}  // namespace
+}  // namespace nurbs
