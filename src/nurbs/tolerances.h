@@ -123,7 +123,7 @@ constexpr double kArcError = 1e-12;     // of it: what arcs about the axis may b
 
 // --- meridians
 constexpr double kMeridianError = 1e-14;  // of the body's size: patches this near a profile times an arc, ...
-constexpr double kMeridianLack = 1.6e-15;  // ... if in all they are no further from it than this
+constexpr double kMeridianLack = 3.2e-15;  // ... if in all they are no further from it than this
 constexpr double kMeridianOver = 1e-9;     // rad, parameters: overlap of the patches round the axis
 constexpr int kMeridianStarts = 64;        // directions of its table
 constexpr int kMeridianSteps = 16;         // of Newton; 2 to 4 are usual
