@@ -9,6 +9,7 @@
 #include "contact/growing_hull.h"
 #include "contact/local_bend.h"
 #include "contact/ring_search.h"
+#include "contact/segment_search.h"
 #include "contact/support_turn.h"
 
 namespace nurbs {
@@ -151,7 +152,9 @@ class Search {
       query(-d / 3 + 0.9428090415820634 * (std::cos(angle) * t + std::sin(angle) * s), -1);
     for (int round = 0; round < kFlatRounds; ++round) {
       Vec3 across;
-      if (start_from_points(round + 1 == kFlatRounds ? 0 : kFlatStart, &across)) return true;
+      // Points alone may be flat, and no hull of theirs any bound: balls are left on them then.
+      const bool any = round + 1 == kFlatRounds && !points_;
+      if (start_from_points(any ? 0 : kFlatStart, &across)) return true;
       query(across, -1);
       query(-across, -1);
     }
@@ -760,12 +763,15 @@ PolytopeResult solve_polytope(const PairFrame& pair, const Vec3& seed, double to
   // its vertices moved at random by far more than round-off and far less than the tolerance (Barber, Dobkin &
   // Huhdanpaa 1996, section 4: joggled input); the upper bound allows for it.
   PolytopeResult best;
+  if (search_segments(pair, tolerance, &best)) return best;
   Vec3 from = seed;
+  bool points = true;
   for (int attempt = 0; attempt < kHullAttempts; ++attempt) {
     const double joggle = attempt > 0 ? std::min(kJoggle * pair.reach, 0.05 * tolerance) : 0.0;
-    Search search(pair, tolerance, joggle, attempt < kPointAttempts);
+    Search search(pair, tolerance, joggle, points);
     if (attempt % 2 == 1) search.let_be();
     const bool started = search.start(from);
+    if (!started || attempt + 1 == kPointAttempts) points = false;
     if (started && attempt == 0 && (pair.a->revolution.found || pair.b->revolution.found)) {
       const bool bent = !pair.inner_map(*pair.a).nodes.empty() && !pair.inner_map(*pair.b).nodes.empty();
       search.run(enough, bent ? kBentBeforeRings : kBeforeRings);
