@@ -59,40 +59,6 @@ class WidePainter {
   std::vector<double> x_, y_, z_, norm_;  // through the cells' middles
 };
 
-// Fine cells of those that promise nothing, painted the same way.
-class ClosePainter {
- public:
-  explicit ClosePainter(NormalMap& map) : map_(map) {
-    map.block.assign(map.radius.size(), -1);
-    int blocks = 0;
-    for (size_t k = 0; k < map.radius.size(); ++k)
-      if (map.radius[k] == std::numeric_limits<float>::infinity()) map.block[k] = blocks++;
-    map.close.assign(static_cast<size_t>(blocks) * kBlock, 0);
-  }
-  void paint(const Vec3& center, double angle, double radius) {
-    const float value = std::nextafter(static_cast<float>(radius), std::numeric_limits<float>::infinity());
-    const auto raise = [&](float& to) { to = std::max(to, value); };
-    if (!(angle <= kNormalCap)) {
-      std::for_each(map_.close.begin(), map_.close.end(), raise);
-      return;
-    }
-    const int fine = map_.cells * kCloseCells;
-    visit_cells(center, angle, fine, [&](int number) {
-      const int row = number / fine, j = number % fine;  // row: face and i
-      const int block = map_.block[row / kCloseCells * map_.cells + j / kCloseCells];
-      if (block >= 0) raise(map_.close[block * kBlock + row % kCloseCells * kCloseCells + j % kCloseCells]);
-    });
-  }
-  void finish() {  // as of the cells
-    for (float& radius : map_.close)
-      if (radius == 0) radius = std::numeric_limits<float>::infinity();
-  }
-
- private:
-  static constexpr int kBlock = kCloseCells * kCloseCells;
-  NormalMap& map_;
-};
-
 class Painter {
  public:
   Painter(const Shape& shape, NormalMap& map) : shape_(shape), map_(map) {}
@@ -107,39 +73,21 @@ class Painter {
       wide_.paint(b.axis, angle, radius, map_);
   }
 
-  // Fills the fine cells, once the others are finished.
-  void paint_close(const std::vector<Leaf>& leaves) {
-    ClosePainter close(map_);
-    for (const Leaf& leaf : leaves) {
-      const CellBounds& b = leaf.bounds;
-      close.paint(b.axis, b.regular ? b.cone + kCloseMargin : kInfinity, b.convex ? b.max_radius : kInfinity);
-    }
-    visit_joints(kCloseCells * kNormalJointSamples, kCloseMargin,
-                 [&](const Vec3& middle, double angle) { close.paint(middle, angle, kInfinity); });
-    close.finish();
-  }
-
   // Creases that open are left as they are: on the surface at a small distance e outside they are tubes, and
   // corners at which all joints open are caps, of radius e and positive orientation, and in h'' + h they
   // count with radius 0.
   void paint_joints() {
-    visit_joints(kNormalJointSamples, kNormalMargin,
-                 [&](const Vec3& middle, double angle) { paint(middle, angle, kInfinity, map_); });
-  }
-
- private:
-  template <class Paint>
-  void visit_joints(int samples, double margin, const Paint& paint) const {
     const double gap = kJointRoundoff * shape_.bounding_radius;
     for (size_t p = 0; p < shape_.patches.size(); ++p)
       for (int e = 0; e < 4; ++e) {
         const EdgeLink& link = shape_.links[p][e];
         const bool kinked = std::abs(link.kink) > kNoKink || link.kink_bound > kNoKink;
         if (link.gap > gap || (kinked && may_close(static_cast<int>(p), e)))
-          visit_joint(static_cast<int>(p), e, samples, margin, paint);
+          paint_joint(static_cast<int>(p), e);
       }
   }
 
+ private:
   bool may_close(int patch, int edge) const {
     const EdgeLink& link = shape_.links[patch][edge];
     if (link.patch < 0 || link.kink < -kNoKink) return true;
@@ -147,12 +95,11 @@ class Painter {
   }
 
   // The normals of both sides and those between.
-  template <class Paint>
-  void visit_joint(int patch, int edge, int samples, double margin, const Paint& paint) const {
+  void paint_joint(int patch, int edge) {
     const EdgeLink& link = shape_.links[patch][edge];
     Vec3 before;
-    for (int k = 0; k <= samples; ++k) {
-      const double t = static_cast<double>(k) / samples;
+    for (int k = 0; k <= kNormalJointSamples; ++k) {
+      const double t = static_cast<double>(k) / kNormalJointSamples;
       const Vec2 at = edge_parameters(edge, t);
       const Vec3 here = local_form(shape_.patches[patch], at[0], at[1]).normal;
       Vec3 there = here;
@@ -163,7 +110,7 @@ class Painter {
       const Vec3 middle = (here + there).normalized();
       const double step = k > 0 ? angle_between(before, middle) : 0;
       const double half = kJointCapSafety * angle_between(middle, here);
-      paint(middle, std::min(kNormalCap, step + half + margin));
+      paint(middle, std::min(kNormalCap, step + half + kNormalMargin), kInfinity, map_);
       before = middle;
     }
   }
@@ -182,18 +129,6 @@ double NormalMap::radius_at(const Vec3& n) const {
   return radius[(c.face * cells + cube_cell(c.a, cells)) * cells + cube_cell(c.b, cells)];
 }
 
-NormalMap::Promise NormalMap::promise_at(const Vec3& n) const {
-  if (cells == 0) return {kInfinity, kNormalMargin};
-  const CubePoint c = to_cube(n);
-  if (!(c.major > 0.5)) return {kInfinity, kNormalMargin};
-  const int cell = (c.face * cells + cube_cell(c.a, cells)) * cells + cube_cell(c.b, cells);
-  const float wide = radius[cell];
-  if (wide < std::numeric_limits<float>::infinity() || block.empty()) return {wide, kNormalMargin};
-  const int fine = cells * kCloseCells, i = cube_cell(c.a, fine) % kCloseCells,
-            j = cube_cell(c.b, fine) % kCloseCells;
-  return {close[(block[cell] * kCloseCells + i) * kCloseCells + j], kCloseMargin};
-}
-
 NormalMap make_normal_map(const Shape& shape, SurfaceBounds* bounds) {
   NormalMap map;
   if (!shape.dented() && shape.patch_curvature.max_radius <= kLongRadius * shape.bounding_radius) return map;
@@ -207,7 +142,6 @@ NormalMap make_normal_map(const Shape& shape, SurfaceBounds* bounds) {
   painter.paint_joints();
   for (float& radius : map.radius)  // a cell that no normal reaches: on a crease
     if (radius == 0) radius = std::numeric_limits<float>::infinity();
-  if (shape.dented()) painter.paint_close(bounds->leaves);
   return map;
 }
 

@@ -20,27 +20,15 @@ struct SurfaceBounds;
 //     h(d) <= d.x + r (1 - d.n).
 // (A direction at which the Gauss map of a closed surface of genus 0 is regular has one preimage more of
 // positive than of negative orientation; away from dents none is negative.)
-//
-// Of dented bodies the cells without a promise are divided, with the same promise for a smaller margin,
-// kCloseMargin: closing joints are narrow, and what is painted about them is mostly margin and width of
-// cells.
 struct NormalMap {
   int cells = 0;              // per cube edge; 0: not made, as the body's own largest radius serves
   std::vector<float> radius;  // per cell, infinite where nothing is promised
   double radius_at(const Vec3& normal) const;
-
-  std::vector<int> block;    // per cell: number of its block of `close`, or -1; empty: there are none
-  std::vector<float> close;  // kCloseCells x kCloseCells radii a block
-  // The radius, infinite where nothing is promised, and the margin for which it holds.
-  struct Promise {
-    double radius, margin;
-  };
-  Promise promise_at(const Vec3& normal) const;
 };
 template <class Archive>
 void archive(Archive& a, NormalMap& s) {
-  auto& [cells, radius, block, close] = s;
-  a(cells, radius, block, close);
+  auto& [cells, radius] = s;
+  a(cells, radius);
 }
 
 // Of a shape whose patches, links, bounds, dents and curvatures are done, if it has dents or its largest

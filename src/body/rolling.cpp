@@ -56,8 +56,8 @@ JointDistance measure_joint_distance(const Shape& shape) {
 RollingRadii rolling_radii(const Shape& shape, const SurfacePoint& at, const Vec3& normal) {
   const JointDistance& joints = shape.joints;
   const CurvatureBounds& patch = shape.patch_curvature;
-  const auto [near, margin] = shape.normal_map.promise_at(normal);
-  if (joints.none()) return {patch.min_radius, patch.max_radius, shape.support_excess, near, margin};
+  const double near = shape.normal_map.cells > 0 ? shape.normal_map.radius_at(normal) : kInfinity;
+  if (joints.none()) return {patch.min_radius, patch.max_radius, shape.support_excess, near};
   const std::array<double, 4>& speed = joints.speed[at.patch];
   // 0 * infinity is not a number: an edge at parameter distance 0 that is smooth must not count.
   double s = joints.width;
@@ -66,7 +66,7 @@ RollingRadii rolling_radii(const Shape& shape, const SurfacePoint& at, const Vec
     if (speed[edge] < kInfinity) s = std::min(s, speed[edge] * std::max(0.0, parameter[edge]));
   const double r0 = patch.min_radius;
   RollingRadii radii{std::min(r0, inscribed(shape, kSineOfOne * std::min(s, r0))), patch.max_radius,
-                     shape.support_excess, near, margin};
+                     shape.support_excess, near};
   if (joints.convex <= kSmallKink) {
     double across_kinks = std::min(0.5 * r0, inscribed(shape, kSineOfOne * std::min(joints.width, r0)));
     if (joints.convex > 0) across_kinks = std::min(across_kinks, 0.25 * s / joints.convex);

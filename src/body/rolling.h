@@ -30,9 +30,9 @@ void archive(Archive& a, JointDistance& s) {
 // At a surface point x with outward normal n:
 //   a ball of radius `inner` that touches at x lies inside the body;
 //   h(d) <= d.x + outer (1 - d.n) + slack for every unit d;
-//   h(d) <= d.x + near (1 - d.n) for unit d with |d - n| <= margin, where `near` is finite.
+//   h(d) <= d.x + near (1 - d.n) for unit d with |d - n| <= kNormalMargin, where `near` is finite.
 struct RollingRadii {
-  double inner, outer, slack, near, margin;
+  double inner, outer, slack, near;
 };
 
 // How far a ball of radius `outer` that touches at x rises above d.x, for |d - n|^2 = chord2: outer (1 -

@@ -199,7 +199,7 @@ double excess_at(const Shape& shape, const Vec3& d, const SurfacePoint& at, cons
   if (!(d.dot(normal.n) > 0)) return std::numeric_limits<double>::infinity();
   const double chord = (d - normal.n).norm() + normal.noise, chord2 = chord * chord;
   const RollingRadii radii = rolling_radii(shape, at, normal.n);
-  if (chord2 <= radii.margin * radii.margin && radii.near < kFarAway) return 0.5 * radii.near * chord2;
+  if (chord2 <= kNormalMargin * kNormalMargin && radii.near < kFarAway) return 0.5 * radii.near * chord2;
   return rolling_excess(radii.outer, shape.bounding_radius, chord2) + radii.slack;
 }
 
@@ -402,7 +402,7 @@ Support confirm_support(const Shape& shape, const Vec3& d, const SurfacePoint& a
 }
 
 bool find_rival(const Shape& shape, const Vec3& d, const Support& best, Support* rival) {
-  if (!shape.dented() || shape.normal_map.promise_at(d).radius < kFarAway)
+  if (!shape.dented() || shape.normal_map.radius_at(d) < kFarAway)
     return false;  // no dent near d: the only point with this normal
   int nodes[4];
   shape.atlas.cell(d, nodes);

@@ -31,8 +31,7 @@ struct Bracket {
   double angle2;  // larger squared angle between d and a normal: the points' error after a Newton step is of
                   // its order
   double unique;  // rho_A + rho_B: a shallower overlap has no other minimiser
-  bool dented = true;             // a dent may be near a normal
-  double margin = kNormalMargin;  // rad: with none, of turns that reach none either
+  bool dented = true;  // a dent may be near a normal
   double width() const { return upper - lower; }
 };
 
@@ -41,7 +40,7 @@ inline double support_excess(const Shape& shape, double scale, const RollingRadi
                              const Vec3& n, double noise = 0) {
   double chord2 = (d - n).squaredNorm();  // 2 (1 - cos), without cancellation
   if (noise > 0) chord2 += noise * (2 * std::sqrt(chord2) + noise);
-  if (chord2 <= radii.margin * radii.margin && radii.near < kFarAway)
+  if (chord2 <= kNormalMargin * kNormalMargin && radii.near < kFarAway)
     return 0.5 * scale * radii.near * chord2;
   return scale * (rolling_excess(radii.outer, shape.bounding_radius, chord2) + radii.slack);
 }
@@ -50,14 +49,8 @@ inline double support_excess(const Shape& shape, double scale, const RollingRadi
 inline RollingRadii radii_at(const Shape& shape, const SurfacePoint& at, const Mat3* axes, const Vec3& n) {
   if (shape.joints.none() && shape.normal_map.cells == 0)
     return {shape.patch_curvature.min_radius, shape.patch_curvature.max_radius, shape.support_excess,
-            std::numeric_limits<double>::infinity(), kNormalMargin};
+            std::numeric_limits<double>::infinity()};
   return rolling_radii(shape, at, axes ? Vec3(axes->transpose() * n) : n);
-}
-
-// Turn of the normal, rad, within which no dent is; 0: one may be at hand.
-inline double dent_margin(const Shape& shape, const RollingRadii& radii) {
-  if (!(radii.slack > kRoundoff * shape.bounding_radius)) return kNormalMargin;
-  return radii.near < kFarAway ? radii.margin : 0;
 }
 
 inline Bracket certify(const PairFrame& pair, const PointPair& p, double noise_a, double noise_b) {
@@ -77,9 +70,10 @@ inline Bracket certify(const PairFrame& pair, const PointPair& p, double noise_a
   const double roundoff = kRoundoff * pair.reach;
   bracket.angle2 = std::max((d - p.na).squaredNorm(), (d + p.nb).squaredNorm());
   bracket.unique = rho_a + rho_b;
-  const double margin_a = dent_margin(*pair.a, radii_a), margin_b = dent_margin(*pair.b, radii_b);
-  bracket.dented = margin_a == 0 || margin_b == 0;
-  bracket.margin = std::min(margin_a, margin_b);
+  const auto dented = [](const Shape& shape, const RollingRadii& radii) {
+    return radii.slack > kRoundoff * shape.bounding_radius && !(radii.near < kFarAway);
+  };
+  bracket.dented = dented(*pair.a, radii_a) || dented(*pair.b, radii_b);
   const double slack = pair.scale_a * pair.a->joint_slack + pair.scale_b * pair.b->joint_slack;
   bracket.upper = distance - rho_a - rho_b + slack + roundoff;
   bracket.lower = d.dot(p.b - p.a) - support_excess(*pair.a, pair.scale_a, radii_a, d, p.na, noise_a) -

@@ -161,7 +161,7 @@ class Follower {
   bool certain(const SurfacePoint& at, const Vec3& n, double r, double chord2) const {
     const RollingRadii radii = radii_at(shape_, at, nullptr, n);
     const double size = shape_.bounding_radius;
-    const bool near = chord2 <= radii.margin * radii.margin && radii.near < kFarAway;
+    const bool near = chord2 <= kNormalMargin * kNormalMargin && radii.near < kFarAway;
     if (!near && shape_.support_excess > kSmallDent * tolerance_ * size) return false;
     const double most = near ? radii.near : radii.outer;
     const double soft = pose_.side > 0 ? r - most : r;

@@ -21,10 +21,10 @@ struct Surfaces {
   V s, su, sv, suu, suv, svv;
 };
 struct Sides {
-  Surfaces at;                             // lab axes, from A's centre
-  V normal;                                // outward, unit
-  WideMask plain;                          // not next to a pole
-  Wide inner, outer, slack, near, margin;  // RollingRadii, lengths of the lab
+  Surfaces at;                     // lab axes, from A's centre
+  V normal;                        // outward, unit
+  WideMask plain;                  // not next to a pole
+  Wide inner, outer, slack, near;  // RollingRadii, lengths of the lab
 };
 
 // Both tangents, fundamental forms, and the normal's own derivatives.
@@ -47,7 +47,7 @@ NURBS_INLINE SymmetricLanes second_form(const Surfaces& f, const V& along) {
 // The surfaces at the lanes' points, placed, with the radii that hold there.
 NURBS_INLINE Sides look(unsigned open, const Shape* const (&shape)[kWidth], const SurfacePoint (&at)[kWidth],
                         const Wide& scale, const Turn<Wide>& turn, const JetLanes (&jet)[kWidth],
-                        double (&margin)[kWidth]) {
+                        bool (&dented)[kWidth]) {
   Wide row[3][8];
   const double* from[kWidth];
   for (int k = 0; k < 3; ++k) {
@@ -61,7 +61,7 @@ NURBS_INLINE Sides look(unsigned open, const Shape* const (&shape)[kWidth], cons
   constexpr double kLost = kNearPole * kNearPole;  // nearer, round-off counts in the certificate
   out.plain = (lu >= kLost * lv) & (lv >= kLost * lu);
   const V n = normalized(cross(su, sv));
-  out.inner = out.outer = out.slack = out.near = out.margin = Wide{};
+  out.inner = out.outer = out.slack = out.near = Wide{};
   for (int l = 0; l < kWidth; ++l) {
     if (!(open >> l & 1)) continue;
     const RollingRadii r = radii_at(*shape[l], at[l], nullptr, lane(n, l));
@@ -69,8 +69,7 @@ NURBS_INLINE Sides look(unsigned open, const Shape* const (&shape)[kWidth], cons
     out.outer[l] = r.outer;
     out.slack[l] = r.slack;
     out.near[l] = r.near;
-    out.margin[l] = r.margin;
-    margin[l] = std::min(margin[l], dent_margin(*shape[l], r));
+    dented[l] = dented[l] || (r.slack > kRoundoff * shape[l]->bounding_radius && !(r.near < kFarAway));
   }
   out.inner *= scale;
   out.outer *= scale;
@@ -90,7 +89,7 @@ NURBS_INLINE Sides look(unsigned open, const Shape* const (&shape)[kWidth], cons
 // Excess of h(d) over d . (surface point), |d - n|^2 = chord2; of a body with this bounding radius.
 NURBS_INLINE Wide excess(const Sides& side, const Wide& radius, const Wide& chord2) {
   const Wide rolling = 0.5 * side.outer * chord2, wedge = 2.0 * radius * root(chord2);
-  return select((chord2 <= side.margin * side.margin) & (side.near < kFarAway), 0.5 * side.near * chord2,
+  return select((chord2 <= kNormalMargin * kNormalMargin) & (side.near < kFarAway), 0.5 * side.near * chord2,
                 smaller(rolling, wedge) + side.slack);
 }
 
@@ -197,7 +196,7 @@ unsigned follow_joints(unsigned asked, double enough, JointLanes* pairs) {
   Parameters at{};
   for (int l = 0; l < kWidth; ++l) {
     pairs->iterations[l] = 0;
-    pairs->margin[l] = kNormalMargin;
+    pairs->dented[l] = false;
     if (!(asked >> l & 1)) {
       pairs->jet_a[l] = pairs->jet_b[l] = JetLanes{};
       continue;
@@ -226,13 +225,12 @@ unsigned follow_joints(unsigned asked, double enough, JointLanes* pairs) {
       evaluate2(pairs->a[l]->patches[on_a.patch], on_a.u, on_a.v, &pairs->jet_a[l]);
       evaluate2(pairs->b[l]->patches[on_b.patch], on_b.u, on_b.v, &pairs->jet_b[l]);
       ++pairs->iterations[l];
-      pairs->margin[l] = kNormalMargin;
+      pairs->dented[l] = false;
     }
     const Sides a =
-        look(open, pairs->a, pairs->on_a, pairs->scale_a, pairs->turn_a, pairs->jet_a, pairs->margin);
-    Sides b = look(open, pairs->b, pairs->on_b, pairs->scale_b, pairs->turn_b, pairs->jet_b, pairs->margin);
+        look(open, pairs->a, pairs->on_a, pairs->scale_a, pairs->turn_a, pairs->jet_a, pairs->dented);
+    Sides b = look(open, pairs->b, pairs->on_b, pairs->scale_b, pairs->turn_b, pairs->jet_b, pairs->dented);
     b.at.s = b.at.s + pairs->offset;
-    for (int l = 0; l < kWidth; ++l) pairs->dented[l] = pairs->margin[l] == 0;
     const BracketLanes bracket = certify(*pairs, a, b, radius_a, radius_b, joint_slack);
     const SymmetricLanes first_a = first_form(a.at), first_b = first_form(b.at),
                          bend_a = second_form(a.at, a.normal), bend_b = second_form(b.at, a.normal);

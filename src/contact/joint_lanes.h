@@ -29,7 +29,6 @@ struct JointLanes {
   Wide unique;  // a shallower overlap has no other minimiser
   int iterations[kWidth];
   bool dented[kWidth];
-  double margin[kWidth];                        // Bracket's
   JetLanes jet_a[kWidth], jet_b[kWidth];        // surfaces where evaluated last, as stored ...
   SurfacePoint base_a[kWidth], base_b[kWidth];  // ... and where that was
 };

@@ -344,7 +344,7 @@ class Ladder {
     const ModelSide b{*pair.b,     pair.scale_b, s.base_b, s.jet_b, pair.turn.transpose(),
                       pair.offset, turned2_b};
     if (!is_worth_a_model(a, b, s.gap, settings_.tolerance, pair.size)) return;
-    const double turn = s.dented ? turn_to_rival(pair, s) : s.bracket.margin;
+    const double turn = s.dented ? turn_to_rival(pair, s) : kNormalMargin;
     make_local_model(a, b, 0.5 * s.bracket.unique, turn, &memory_.model);
   }
 
@@ -355,7 +355,7 @@ class Ladder {
       const Support own = confirm_support(shape, d, at);
       Support rival;
       return find_rival(shape, d, own, &rival) ? std::max(0.0, own.h - rival.h) / shape.bounding_radius
-                                               : 4 * shape.normal_map.promise_at(d).margin;
+                                               : std::numeric_limits<double>::infinity();
     };
     const double least = std::min(clear(*pair.a, s.normal, s.points.on_a),
                                   clear(*pair.b, pair.direction_on_b(s.normal), s.points.on_b));

@@ -101,8 +101,6 @@ constexpr int kAtlasSamples = 4;  // per patch and direction, to start the first
 // --- normal map
 constexpr int kNormalCells = 64;        // per cube edge: cells 0.01 to 0.03 rad wide
 constexpr double kNormalMargin = 0.01;  // rad around a normal for which the map's promise holds
-constexpr int kCloseCells = 4;          // per edge of such a cell, where it promises nothing ...
-constexpr double kCloseMargin = 1e-3;   // ... rad, of the promise there
 constexpr double kLongRadius = 4;       // bounding radii
 constexpr double kRoundLeafAngle =
     0.035;  // rad: leaves are halved until their normals are as close together ...

@@ -85,7 +85,7 @@ void ContactStages::follow_surfaces(ContactBlock& block, int first, Results& res
                     side_b = side(pb, pairs.base_b[l], pairs.jet_b[l], proof.q_b);
     if (!pairs.dented[l] &&
         is_worth_a_model(side_a, side_b, pairs.gap[l], step_.settings.tolerance, pairs.size[l]))
-      make_local_model(side_a, side_b, 0.5 * pairs.unique[l], pairs.margin[l], &model);
+      make_local_model(side_a, side_b, 0.5 * pairs.unique[l], kNormalMargin, &model);
     if (model.unique > 0)
       block.set(lane, 0, kLocalModelSize, &model);
     else

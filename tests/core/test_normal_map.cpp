@@ -20,24 +20,22 @@ struct Seen {
   double closest = 0;  // largest share of the promised excess that was there
 };
 
-// `dents`: only where dents are near, for which the cells are divided.
-Seen check(const Shape& shape, int directions, bool dents = false) {
+Seen check(const Shape& shape, int directions) {
   Random random(4);
   Seen seen;
   for (int k = 0; k < directions; ++k) {
     const Vec3 n = random.direction();
-    const auto [r, margin] = shape.normal_map.promise_at(n);
-    if (dents && margin == kNormalMargin) continue;
+    const double r = shape.normal_map.radius_at(n);
     ++seen.all;
     if (!(r < kFarAway)) continue;
     ++seen.promised;
     const Support at = find_support(shape, n);
     EXPECT_NEAR(at.h, exhaustive_support(shape, n), 1e-13) << shape.name << " has two support points";
-    const Vec3 d = (n + random.uniform(0, 0.99) * margin * n.unitOrthogonal()).normalized();
+    const Vec3 d = (n + random.uniform(0, 0.99) * kNormalMargin * n.unitOrthogonal()).normalized();
     const double excess = exhaustive_support(shape, d) - d.dot(at.point);
     const double allowed = 0.5 * r * (d - n).squaredNorm();
     EXPECT_LE(excess, allowed + 1e-14) << shape.name;
-    if (allowed > (dents ? 1e-11 : 1e-9)) seen.closest = std::max(seen.closest, excess / allowed);
+    if (allowed > 1e-9) seen.closest = std::max(seen.closest, excess / allowed);
   }
   return seen;
 }
@@ -50,14 +48,6 @@ TEST(NormalMap, bounds_supports_near_every_normal_it_promises_for) {
     EXPECT_GT(seen.closest, 0.3) << "the promise is so loose that the test shows nothing";
 }
 
-TEST(NormalMap, promises_more_near_dents_for_smaller_turns) {
-  const Seen seen = check(*blocky(), 900, true);
-  EXPECT_GT(seen.all, 100);
-  EXPECT_GT(seen.promised, 0.3 * seen.all);
-  EXPECT_GT(seen.closest, 0.3);
-  EXPECT_TRUE(disc()->normal_map.block.empty());
-}
-
 TEST(NormalMap, promises_nothing_across_dents) {
   // Where two support points compete, on either side of a closing joint, nothing may be promised.
   const Shape& shape = *blocky();
@@ -68,7 +58,7 @@ TEST(NormalMap, promises_nothing_across_dents) {
     const Maxima found = all_maxima(shape, d);
     if (!(found.rival > found.best - 1e-4)) continue;
     ++rivals;
-    EXPECT_FALSE(shape.normal_map.promise_at(d).radius < kFarAway);
+    EXPECT_FALSE(shape.normal_map.radius_at(d) < kFarAway);
   }
   EXPECT_GT(rivals, 10);
 }
