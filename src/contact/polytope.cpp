@@ -207,6 +207,7 @@ class Search {
     balances_ = kMostBalances;
   }
 
+  bool only_points() const { return points_; }
   // Whether round-off ended the search, so that other directions may do better.
   bool stalled() const { return stalled_; }
 
@@ -770,8 +771,12 @@ PolytopeResult solve_polytope(const PairFrame& pair, const Vec3& seed, double to
     const double joggle = attempt > 0 ? std::min(kJoggle * pair.reach, 0.05 * tolerance) : 0.0;
     Search search(pair, tolerance, joggle, points);
     if (attempt % 2 == 1) search.let_be();
-    const bool started = search.start(from);
+    const bool started = search.start(from), flat = points && !started;
     if (!started || attempt + 1 == kPointAttempts) points = false;
+    if (flat && search.only_points()) {
+      --attempt;
+      continue;
+    }
     if (started && attempt == 0 && (pair.a->revolution.found || pair.b->revolution.found)) {
       const bool bent = !pair.inner_map(*pair.a).nodes.empty() && !pair.inner_map(*pair.b).nodes.empty();
       search.run(enough, bent ? kBentBeforeRings : kBeforeRings);

@@ -9,17 +9,20 @@ namespace {
 
 constexpr double kParallel = 1e-20;  // squared sine, below which segments are
 
+// A point, if `half` is 0.
 struct Segment {
   Vec3 middle, half;
   Vec3 at(double t) const { return middle + t * half; }
   // Parameter of its point nearest to x.
   double nearest(const Vec3& x) const {
-    return std::clamp(half.dot(x - middle) / half.squaredNorm(), -1.0, 1.0);
+    const double length2 = half.squaredNorm();
+    return length2 > 0 ? std::clamp(half.dot(x - middle) / length2, -1.0, 1.0) : 0.0;
   }
 };
 
 Segment segment_of(const SpheroPolyhedron& core, double scale, const Mat3& turn, const Vec3& offset) {
-  const Vec3 p = offset + scale * (turn * core.points[0]), q = offset + scale * (turn * core.points[1]);
+  const Vec3 p = offset + scale * (turn * core.points.front()),
+             q = offset + scale * (turn * core.points.back());
   return {0.5 * (p + q), 0.5 * (p - q)};
 }
 
@@ -30,7 +33,7 @@ bool search_segments(const PairFrame& pair, double tolerance, PolytopeResult* re
       !PairFrame::is_swept(*pair.b, pair.scale_b, tolerance))
     return false;
   const SpheroPolyhedron &core_a = pair.a->core, &core_b = pair.b->core;
-  if (core_a.points.size() != 2 || core_b.points.size() != 2) return false;
+  if (core_a.points.size() > 2 || core_b.points.size() > 2) return false;
   const Segment a = segment_of(core_a, pair.scale_a, Mat3::Identity(), Vec3::Zero()),
                 b = segment_of(core_b, pair.scale_b, pair.turn, pair.offset);
   const double radius_a = pair.scale_a * core_a.radius, radius_b = pair.scale_b * core_b.radius,
@@ -56,6 +59,8 @@ bool search_segments(const PairFrame& pair, double tolerance, PolytopeResult* re
   };
   consider(between);
   consider(across.dot(apart) < 0 ? Vec3(-across) : across);
+  for (const Vec3& half : {a.half, b.half})  // on one line
+    if (half.squaredNorm() > 0) consider(half.unitOrthogonal());
   const double upper = between.norm() - radius_a - radius_b + error;
   if (!(upper + least <= tolerance)) return false;
   PolytopeResult& r = *result;

@@ -102,6 +102,29 @@ TEST(SpheroPolyhedron, capsules_against_segments) {
   }
 }
 
+// One axis, or nearly: all round it is as good.
+TEST(SpheroPolyhedron, capsules_on_one_axis) {
+  const Body body = make_shape("capsule", capsule(0.3, 2)),
+             ball = make_shape("ball", exact_ellipsoid({1, 1, 1}));
+  const double radius = body->core.radius;
+  Random random(6);
+  for (int k = 0; k < 100; ++k) {
+    const bool other = k % 3 == 0;
+    const Particle a{body.get(), 1, Vec3::Zero(), random.turn()};
+    const double tilt = k % 4 ? random.log_uniform(1e-16, 1e-3) : 0,
+                 off = k % 5 ? random.log_uniform(1e-16, 0.1) : 0;
+    const Particle b{other ? ball.get() : body.get(), random.log_uniform(0.2, 2),
+                     a.q * Vec3(0, 0, random.uniform(-0.9, 0.9)) + off * random.direction(),
+                     (random.turn_by(tilt) * a.q).normalized()};
+    const Vec3 u = a.q * body->core.points[0],
+               v = other ? Vec3(1e-30, 0, 0) : Vec3(b.q * (b.scale * body->core.points[0]));
+    double memory[kPairMemorySize] = {0};
+    const ContactResult r = find_contact(a, b, ContactSettings(), memory);
+    EXPECT_EQ(r.status, Status::converged) << k << " tilt " << tilt << " off " << off;
+    EXPECT_NEAR(r.gap, segments_apart(a.x, u, b.x, v) - radius - b.scale * (other ? 1 : radius), 3e-9) << k;
+  }
+}
+
 // Left open, with brackets of 1e-8 to 1e-6, by hulls and rings that took enclosed least radii for the balls'.
 TEST(SpheroPolyhedron, saved_pairs) {
   for (const char* name : {"capsule-in-conic", "capsule-on-conic-axis", "capsule-at-reuleaux-saddle",
