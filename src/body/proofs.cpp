@@ -151,6 +151,11 @@ std::vector<std::string> describe_proofs(const Shape& shape) {
     lines.emplace_back("not proven: that there are no dents; none was found");
   if (!none && shape.concavity > 0)
     lines.push_back(format("measured, not proven: dents %.3g deep", shape.concavity));
+  if (shape.core.points.size() > 1)
+    lines.push_back(
+        format("from positions: a polyhedron of %zu points with a ball of radius %.6g about each, "
+               "to %.1g",
+               shape.core.points.size(), shape.core.radius, shape.core.error));
   return lines;
 }
 

@@ -213,7 +213,7 @@ class CellSearch {
     const auto take = [&](double value, const Vec2& x) {
       if (value < least) least = value, *where = x;
     };
-    double x;
+    double x = 0;
     for (const double e : {from, to})
       take(on_line(m.y + e * (s0 + 0.5 * h00 * e), s1 + h01 * e, h11, -side, side, &x),
            e * across + x * along);
