@@ -148,6 +148,7 @@ MassProperties from_moments(const Moments& m, const Vec3& reference) {
 
 MassProperties integrate_mass(const std::vector<BezierPatch>& given) {
   std::vector<BezierPatch> patches;
+  patches.reserve(given.size());
   for (const BezierPatch& patch : given) patches.push_back(patch.rational ? with_even_weights(patch) : patch);
   const Vec3 reference = middle_of_box(patches);
   std::vector<GaussRule> rules(5 * kMaxDegree + 1);
