@@ -134,6 +134,7 @@ class Finder {
 
   // Takes every patch that lies on a ball of that radius; false if there are too many.
   bool balls() {
+    double most = 0;  // off them
     for (int k = 0; k < static_cast<int>(shape_.patches.size()); ++k) {
       const BezierPatch& patch = shape_.patches[k];
       const Sample middle = sample(patch, 0.5, 0.5);
@@ -149,9 +150,9 @@ class Finder {
         out_.points.push_back(centre);
       }
       on_ball_[k] = true;
-      off_ = std::max(off_, off * out_.radius);
+      most = std::max(most, off * out_.radius);
     }
-    out_.error += off_;
+    out_.error += most;
     return true;
   }
 
@@ -169,7 +170,6 @@ class Finder {
   }
 
   const Shape& shape_;
-  double off_ = 0;
   std::vector<bool> on_ball_;
   SpheroPolyhedron out_;
 };

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "body/cube_map.h"
 #include "contact/local_bend.h"
 
 namespace nurbs {
@@ -229,29 +230,35 @@ class CellSearch {
     return least;
   }
 
-  // What the cosines, the rate and round-off take from that within `reach`.
-  static double left_out(const Mean& m, double reach) {
-    const double sine = std::sin(std::min(reach, 0.5 * M_PI)),
-                 half = 1 / (1 + std::cos(std::min(reach, 0.5 * M_PI))) - 0.5,
-                 down = std::max(0.0, m.y - extremes(m.bend).least);
-    return half * down * sine * sine + m.rate * reach * reach * reach / 6;
+  // A cell about its middle: the angle, at most a right one, and its sine and cosine.
+  struct Range {
+    double angle, sine, cosine;
+    explicit Range(double reach)
+        : angle(std::min(reach, 0.5 * M_PI)), sine(std::sin(angle)), cosine(std::cos(angle)) {}
+  };
+
+  // What the cosines and the rate take from that within a range.
+  static double left_out(const Mean& m, const Range& range) {
+    const double half = 1 / (1 + range.cosine) - 0.5, down = std::max(0.0, m.y - extremes(m.bend).least);
+    return half * down * range.sine * range.sine + m.rate * range.angle * range.angle * range.angle / 6;
   }
 
-  static double least_of(const Mean& m, double reach, Vec2* where) {
-    const double r = std::sin(std::min(reach, 0.5 * M_PI));
-    return least_in_box(m, Vec2::UnitX(), -r, r, r, where) - left_out(m, reach);
+  static double least_of(const Mean& m, const Range& range, double left, Vec2* where) {
+    const double r = range.sine;
+    return least_in_box(m, Vec2::UnitX(), -r, r, r, where) - left;
   }
 
-  // Of the higher of two, on either side of the line on which they are level.
-  static double least_of(const Mean& p, const Mean& q, double reach, Vec2* where) {
+  // Of the higher of two, on either side of the line on which they are level. `left_p`, `left_q`: left out.
+  static double least_of(const Mean& p, const Mean& q, const Range& range, double left_p, double left_q,
+                         Vec2* where) {
     const Vec2 apart = q.slope - p.slope;
-    const double steep = apart.norm(), r = std::sin(std::min(reach, 0.5 * M_PI));
+    const double steep = apart.norm(), r = range.sine;
     if (!(steep > 0)) return -kFarAway;
     const Vec2 across = apart / steep;
     const double level = std::clamp((p.y - q.y) / steep, -r, r);
     Vec2 other;
-    const double low = least_in_box(p, across, -r, level, r, where) - left_out(p, reach),
-                 high = least_in_box(q, across, level, r, r, &other) - left_out(q, reach);
+    const double low = least_in_box(p, across, -r, level, r, where) - left_p,
+                 high = least_in_box(q, across, level, r, r, &other) - left_q;
     if (high < low) *where = other;
     return std::min(low, high);
   }
@@ -261,25 +268,27 @@ class CellSearch {
                double enough, Vec2* where) const {
     Mean mean[kPieces * kPieces];
     const int count = means(d, t, u, a, b, mean);
-    double best = -kFarAway;
+    const Range range(reach);
+    double best = -kFarAway, left[kMeans];
+    for (int i = 0; i < count; ++i) left[i] = left_out(mean[i], range);
     Vec2 at;
     const auto take = [&](double least) {
       if (least > best) best = least, *where = at;
       return best >= enough;
     };
     for (int i = 0; i < count; ++i)
-      if (take(least_of(mean[i], reach, &at))) return best;
+      if (take(least_of(mean[i], range, left[i], &at))) return best;
     for (int i = 0; i < count; ++i)
       for (int j = i + 1; j < count; ++j)
-        if (take(least_of(mean[i], mean[j], reach, &at))) return best;
+        if (take(least_of(mean[i], mean[j], range, left[i], left[j], &at))) return best;
     if (reach > kNarrow) return best;
     for (int i = 0; i < count; ++i)
       for (int j = i + 1; j < count; ++j)
         for (int k = j + 1; k < count; ++k) {
           Vec3 w;
           if (!level(mean[i], mean[j], mean[k], &w)) continue;
-          if (take(least_of(Mean::of(Mean::of(mean[i], w[0], mean[j], w[1]), 1, mean[k], w[2]), reach, &at)))
-            return best;
+          const Mean all = Mean::of(Mean::of(mean[i], w[0], mean[j], w[1]), 1, mean[k], w[2]);
+          if (take(least_of(all, range, left_out(all, range), &at))) return best;
         }
     return best;
   }
@@ -315,14 +324,16 @@ class CellSearch {
     return w->minCoeff() > 0;
   }
 
-  double overlap(const Vec3& d) {
+  // Takes a direction, whose pieces these are, if p is less along it.
+  void consider(const Vec3& d, const Pieces& a, const Pieces& b) {
+    if (const double p = a.upper + b.upper; p < best_) best_ = p, best_d_ = d;
+  }
+  void consider(const Vec3& d) {
     Pieces a, b;
     const Vec3 t = d.unitOrthogonal(), u = d.cross(t);
     find(a_, d, t, u, kWitness, &a);
     find(b_, d, t, u, kWitness, &b);
-    const double p = a.upper + b.upper;
-    if (p < best_) best_ = p, best_d_ = d;
-    return p;
+    consider(d, a, b);
   }
 
   bool close() {
@@ -337,25 +348,20 @@ class CellSearch {
     while (top > 0) {
       if (++cells > kMostCells) return false;
       const Cell cell = stack[--top];
-      const int k = cell.face / 2;
-      Vec3 d;
-      d[k] = cell.face % 2 ? -1 : 1;
-      d[(k + 1) % 3] = cell.a;
-      d[(k + 2) % 3] = cell.b;
-      // Within this of the middle: on the face, at least 1 from the origin, no angle is wider.
+      Vec3 d = from_cube(cell.face, cell.a, cell.b);
+      // Within this of the middle: half the diagonal over |d| is the sine of no smaller angle.
       const double reach = M_SQRT2 * cell.half / d.norm() * (1 + 0.5 * cell.half);
       d.normalize();
       const Vec3 t = d.unitOrthogonal(), u = d.cross(t);
       Pieces a, b;
       find(a_, d, t, u, reach, &a);
       find(b_, d, t, u, reach, &b);
-      const double p = a.upper + b.upper;
-      if (p < best_) best_ = p, best_d_ = d;
+      consider(d, a, b);
       const double threshold = best_ - kClosedShare * tolerance_;
       Vec2 where;
       const double least = bound(d, t, u, reach, a, b, threshold - balls_ + noise_, &where) + balls_ - noise_;
       if (least >= threshold) continue;
-      if (cell.half < 0.2) overlap((d + where[0] * t + where[1] * u).normalized());
+      if (cell.half < 0.2) consider((d + where[0] * t + where[1] * u).normalized());
       if (cell.half < smallest) return false;
       const double half = 0.5 * cell.half;
       for (const double i : {-half, half})
@@ -404,9 +410,7 @@ class CellSearch {
     r->points.b = best.b - b_.ball * d;
     r->points.on_a = support(a_, d).where;
     r->points.on_b = support(b_, -d).where;
-    const Vec3 shift = 0.5 * (r->gap - d.dot(r->points.b - r->points.a)) * d;
-    r->points.a -= shift;
-    r->points.b += shift;
+    part_points(r);
   }
 
   const PairFrame& pair_;

@@ -771,9 +771,9 @@ PolytopeResult solve_polytope(const PairFrame& pair, const Vec3& seed, double to
     const double joggle = attempt > 0 ? std::min(kJoggle * pair.reach, 0.05 * tolerance) : 0.0;
     Search search(pair, tolerance, joggle, points);
     if (attempt % 2 == 1) search.let_be();
-    const bool started = search.start(from), flat = points && !started;
-    if (!started || attempt + 1 == kPointAttempts) points = false;
-    if (flat && search.only_points()) {
+    const bool started = search.start(from), flat = search.only_points() && !started;
+    if (flat || attempt + 1 == kPointAttempts) points = false;
+    if (flat) {  // the same attempt, with balls
       --attempt;
       continue;
     }

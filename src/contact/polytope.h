@@ -15,6 +15,14 @@ struct PolytopeResult {
   bool converged;    // bracket no wider than the tolerance
 };
 
+// Moves the points along the normal, half each, until they are the gap apart.
+inline void part_points(PolytopeResult* r) {
+  const Vec3& d = r->points.na;
+  const Vec3 shift = 0.5 * (r->gap - d.dot(r->points.b - r->points.a)) * d;
+  r->points.a -= shift;
+  r->points.b += shift;
+}
+
 // Grows a polytope inside the configuration space obstacle A - B (shrunk by a share of the bodies' least
 // curvature radii, which are added back) from exact support points. While the origin is outside, the next
 // direction is that of the polytope's nearest point, as in GJK, and |nearest point| bounds the gap above;

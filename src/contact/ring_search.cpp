@@ -616,9 +616,7 @@ class RingSearch {
     r->points.on_a = k_is_a ? on_k_ : on_m_;
     r->points.on_b = k_is_a ? on_m_ : on_k_;
     r->gap = r->bracket.lower;
-    const Vec3 shift = 0.5 * (r->gap - d.dot(r->points.b - r->points.a)) * d;
-    r->points.a -= shift;
-    r->points.b += shift;
+    part_points(r);
   }
 
   void witness(const Circle& c, double phi, Vec3* on_k, Vec3* on_m) const {
@@ -650,9 +648,8 @@ bool search_rings(const PairFrame& pair, double tolerance, bool last, PolytopeRe
     const Shape& k = k_is_a ? *pair.a : *pair.b;
     if (!k.revolution.found || k.proofs.sphere) continue;
     const Shape& mate = k_is_a ? *pair.b : *pair.a;
-    const bool round =
-        PairFrame::rolling_ball(mate, 1, tolerance / (k_is_a ? pair.scale_b : pair.scale_a)) > 0 &&
-        !mate.proofs.sphere;
+    const double scale = k_is_a ? pair.scale_b : pair.scale_a;
+    const bool round = PairFrame::rolling_ball(mate, scale, tolerance) > 0 && !mate.proofs.sphere;
     // Circles of a mate about nearly the same axis serve better, unless it ends in spheres.
     const Vec3 axis = k_is_a ? Vec3(pair.turn * mate.revolution.axis) : mate.revolution.axis,
                own = k_is_a ? k.revolution.axis : Vec3(pair.turn * k.revolution.axis);

@@ -72,9 +72,9 @@ bool search_segments(const PairFrame& pair, double tolerance, PolytopeResult* re
   r.gap = std::clamp(between.norm() - radius_a - radius_b, r.bracket.lower, r.bracket.upper);
   r.points.na = normal;
   r.points.nb = -normal;
-  const Vec3 shift = 0.5 * (r.gap - normal.dot(between) + radius_a + radius_b) * normal;
-  r.points.a = x + radius_a * normal - shift;
-  r.points.b = y - radius_b * normal + shift;
+  r.points.a = x + radius_a * normal;
+  r.points.b = y - radius_b * normal;
+  part_points(&r);
   r.points.on_a = find_hull_support(*pair.a, normal).where;
   r.points.on_b = find_hull_support(*pair.b, pair.direction_on_b(normal)).where;
   return true;
