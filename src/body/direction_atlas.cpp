@@ -52,6 +52,34 @@ double DirectionAtlas::support_upper(const Vec3& d) const {
   return c.major * (low + s * (high - low));
 }
 
+void DirectionAtlas::support_upper(const Triple<Lane4>& d, Lane4* upper) const {
+  using Ints = int __attribute__((vector_size(16)));
+  const Lane4 zero = all<Lane4>(0), last = all<Lane4>(cells - 1), half = all<Lane4>(0.5 * cells);
+  const Lane4 x = magnitude(d.x), y = magnitude(d.y), z = magnitude(d.z);
+  const Mask4 on_x = (x >= y) & (x >= z), on_y = y >= z;  // where not on x
+  const Lane4 towards = select(on_x, d.x, select(on_y, d.y, d.z)), major = magnitude(towards);
+  const Lane4 a = (select(on_x, d.y, select(on_y, d.z, d.x)) / major + 1.0) * half,
+              b = (select(on_x, d.z, select(on_y, d.x, d.y)) / major + 1.0) * half;
+  const auto cell_of = [&](const Lane4& at) {  // 0 where d is none
+    const Lane4 inside = select(at > 0.0, smaller(at, last), zero);
+    return __builtin_convertvector(__builtin_convertvector(inside, Ints), Lane4);
+  };
+  const Lane4 i = cell_of(a), j = cell_of(b), s = a - i, t = b - j, row = all<Lane4>(cells + 1),
+              face = select(on_x, zero, select(on_y, all<Lane4>(2), all<Lane4>(4))) +
+                     select(towards < 0.0, all<Lane4>(1), zero);
+  const Ints first = __builtin_convertvector((face * row + i) * row + j, Ints);
+  Lane4 h0, h1, k0, k1;
+  for (int l = 0; l < 4; ++l) {
+    const double* const h = support.data() + first[l];
+    h0[l] = h[0];
+    h1[l] = h[1];
+    k0[l] = h[cells + 1];
+    k1[l] = h[cells + 2];
+  }
+  const Lane4 low = h0 + t * (h1 - h0), high = k0 + t * (k1 - k0);
+  *upper = major * (low + s * (high - low));
+}
+
 namespace {
 
 // A few points of every patch, to start the first support searches from; coordinates by kWidth side by side,

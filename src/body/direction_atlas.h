@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "nurbs/types.h"
+#include "nurbs/wide.h"
 
 namespace nurbs {
 
@@ -34,6 +35,7 @@ struct DirectionAtlas {
   // and homogeneous and the interpolation is a convex combination of the node directions that equals d. ~5
   // ns.
   double support_upper(const Vec3& d) const;
+  void support_upper(const Triple<Lane4>& d, Lane4* upper) const;  // of four at once
   // The node nearest to d; the (unnormalised) direction of a node: the largest component is +-1.
   int nearest(const Vec3& d) const;
   // The four nodes around d.

@@ -46,6 +46,7 @@ void copy(const Box& from, Box* to) {
 
 struct Rows {
   Lane4 r[4];
+  Rows() = default;
   NURBS_INLINE explicit Rows(const double* c) { std::memcpy(r, c, sizeof r); }
   NURBS_INLINE Rows turned() const {
     Rows t = *this;
@@ -56,6 +57,52 @@ struct Rows {
 };
 NURBS_INLINE double highest(const Lane4& a) {
   return std::max(std::max(a[0], a[1]), std::max(a[2], a[3]));
+}
+
+// De Casteljau at t between rows: r[0] to r[3] become those of [0, t], or of [t, 1].
+NURBS_INLINE void cut_rows(double t, bool keep_low, Rows* c) {
+  const double s = 1 - t;
+  Lane4(&r)[4] = c->r;
+  const Lane4 a = s * r[0] + t * r[1], b = s * r[1] + t * r[2], d = s * r[2] + t * r[3];
+  const Lane4 ab = s * a + t * b, bd = s * b + t * d, at = s * ab + t * bd;
+  if (keep_low) {
+    r[1] = a;
+    r[2] = ab;
+    r[3] = at;
+  } else {
+    r[0] = at;
+    r[1] = bd;
+    r[2] = d;
+  }
+}
+NURBS_INLINE void cut_rows(double from, double to, Rows* c) {
+  if (to < 1) cut_rows(to, true, c);
+  if (from > 0) cut_rows(from / to, false, c);
+}
+
+// The same of any line of coefficients.
+void cut_line(double* c, int degree, int stride, double from, double to) {
+  if (to < 1)
+    for (int i = 1; i <= degree; ++i)
+      for (int k = degree; k >= i; --k) c[k * stride] = (1 - to) * c[(k - 1) * stride] + to * c[k * stride];
+  const double t = from / to;
+  if (t > 0)
+    for (int i = 1; i <= degree; ++i)
+      for (int k = 0; k <= degree - i; ++k) c[k * stride] = (1 - t) * c[k * stride] + t * c[(k + 1) * stride];
+}
+
+// The net of a piece of the patch from the patch's.
+NURBS_INLINE void cut(const PatchPiece& to, Rows* net) {
+  cut_rows(to.u0, to.u1, net);
+  if (to.v0 == 0 && to.v1 == 1) return;
+  *net = net->turned();
+  cut_rows(to.v0, to.v1, net);
+  *net = net->turned();
+}
+void cut(const PatchPiece& to, int nu, int nv, double* c) {
+  const int row = nv + 1;
+  for (int j = 0; j < row; ++j) cut_line(c + j, nu, row, to.u0, to.u1);
+  for (int i = 0; i <= nu; ++i) cut_line(c + i * row, nv, 1, to.v0, to.v1);
 }
 
 // `low` into both halves.
@@ -246,21 +293,19 @@ Bounds bounds_of(const Box& box, bool bicubic, const double* g) {
 
 class Search {
  public:
-  Search(const BezierPatch& patch, int index, const Vec3& d, double slack, Highest* best)
-      : patch_(patch), index_(index), d_(d), slack_(slack), h0_(best->h), best_(best) {}
+  Search(const BezierPatch& patch, const PatchPiece& piece, const Vec3& d, double slack, Highest* best)
+      : patch_(patch), piece_(piece), d_(d), slack_(slack), h0_(best->h), best_(best) {}
 
   void run() {
     Box& root = stack_[0];
     root.nu = patch_.degree_u;
     root.nv = patch_.degree_v;
     root.rational = patch_.rational;
-    root.u0 = root.v0 = 0;
-    root.u1 = root.v1 = 1;
-    for (int k = 0; k < root.size(); ++k) {
-      const Vec4& p = patch_.points[k];
-      root.f[k] = d_.dot(p.head<3>()) - h0_ * p[3];
-      if (root.rational) root.w[k] = p[3];
-    }
+    root.u0 = piece_.u0;
+    root.u1 = piece_.u1;
+    root.v0 = piece_.v0;
+    root.v1 = piece_.v1;
+    set_root(&root);
     double over = 0;  // of boxes given up, above h0
     int top = 1;
     for (int boxes = 0; top > 0; ++boxes) {
@@ -299,6 +344,33 @@ class Search {
  private:
   enum class Next { done, edges, halve_u, halve_v };
 
+  void set_root(Box* root) const {
+    if (root->bicubic()) {  // four points at a time, and all in registers until the rows are stored
+      Rows f, w;
+      for (int i = 0; i < 4; ++i) {
+        Lane4 p[4], q[4];
+        for (int k = 0; k < 4; ++k) std::memcpy(&p[k], patch_.points[4 * i + k].data(), sizeof p[k]);
+        transpose({p[0], p[1], p[2], p[3]}, q);
+        f.r[i] = d_[0] * q[0] + d_[1] * q[1] + d_[2] * q[2] - h0_ * q[3];
+        w.r[i] = q[3];
+      }
+      cut(piece_, &f);
+      f.store(root->f);
+      if (!root->rational) return;
+      cut(piece_, &w);
+      w.store(root->w);
+      return;
+    }
+    for (int k = 0; k < root->size(); ++k) {
+      const Vec4& p = patch_.points[k];
+      root->f[k] = d_.dot(p.head<3>()) - h0_ * p[3];
+      if (root->rational) root->w[k] = p[3];
+    }
+    if (piece_.whole()) return;
+    cut(piece_, root->nu, root->nv, root->f);
+    if (root->rational) cut(piece_, root->nu, root->nv, root->w);
+  }
+
   static double highest_coefficient(const Box& box) {
     double most = -kFarAway;
     for (int k = 0; k < box.size(); ++k) most = std::max(most, box.f[k] / box.weight(k));
@@ -308,7 +380,7 @@ class Search {
   void offer(double u, double v, double height) {
     if (!(h0_ + height > best_->h)) return;
     best_->h = h0_ + height;
-    best_->where = {index_, u, v};
+    best_->where = {piece_.patch, u, v};
   }
   void offer_corner(const Box& box, bool high_u, bool high_v) {
     const int k = (high_u ? box.nu * (box.nv + 1) : 0) + (high_v ? box.nv : 0);
@@ -397,7 +469,7 @@ class Search {
     const double width_u = box.u1 - box.u0, width_v = box.v1 - box.v0;
     double s = 0.5, t = 0.5;
     const SurfacePoint& at = best_->where;
-    if (at.patch == index_ && at.u >= box.u0 && at.u <= box.u1 && at.v >= box.v0 && at.v <= box.v1) {
+    if (at.patch == piece_.patch && at.u >= box.u0 && at.u <= box.u1 && at.v >= box.v0 && at.v <= box.v1) {
       if (u) s = (at.u - box.u0) / width_u;
       if (v) t = (at.v - box.v0) / width_v;
     }
@@ -408,6 +480,7 @@ class Search {
       const bool at_v = !v || (t <= 0 && x.fv < 0) || (t >= 1 && x.fv > 0);
       const double gu = at_u ? 0 : x.fu, gv = at_v ? 0 : x.fv;
       const double rest = 0.5 * (gu * gu / a + gv * gv / c) / share;
+      if (x.f + rest <= 0) return true;
       const double weight = box.rational ? evaluate_net(box.w, box.nu, box.nv, s, t).f : 1;
       double s_next = s, t_next = t;
       const double det = x.fuu * x.fvv - x.fuv * x.fuv;
@@ -421,9 +494,8 @@ class Search {
       t_next = std::clamp(t_next, 0.0, 1.0);
       const bool still = !(s_next != s || t_next != t);
       if (rest <= kConcaveRest * slack_ * weight || still || k == kConcaveSteps) {
-        const double before = best_->h;
         offer(box.u0 + s * width_u, box.v0 + t * width_v, level_ + x.f / weight);
-        return !(best_->h > before) && x.f + rest <= 0;
+        return false;
       }
       s = s_next;
       t = t_next;
@@ -431,7 +503,7 @@ class Search {
   }
 
   const BezierPatch& patch_;
-  const int index_;
+  const PatchPiece& piece_;
   const Vec3& d_;
   const double slack_, h0_;
   Highest* best_;
@@ -455,9 +527,9 @@ void raise_to_corner(const BezierPatch& patch, int index, const Vec3& d, double 
 
 }  // namespace
 
-void raise(const BezierPatch& patch, int index, const Vec3& d, double slack, Highest* best) {
-  if (patch.degree_u == 1 && patch.degree_v == 1) return raise_to_corner(patch, index, d, slack, best);
-  Search(patch, index, d, slack, best).run();
+void raise(const BezierPatch& patch, const PatchPiece& piece, const Vec3& d, double slack, Highest* best) {
+  if (patch.degree_u == 1 && patch.degree_v == 1) return raise_to_corner(patch, piece.patch, d, slack, best);
+  Search(patch, piece, d, slack, best).run();
 }
 
 }  // namespace nurbs

@@ -17,13 +17,20 @@ struct Highest {
   int boxes;     // looked at
 };
 
-// Searches patch number `index` for points higher than `best->h` by more than `slack` (length, some ulp of
+// A rectangle of a patch's parameters; the whole patch unless said otherwise.
+struct PatchPiece {
+  int patch = 0;
+  float u0 = 0, u1 = 1, v0 = 0, v1 = 1;
+  bool whole() const { return u0 == 0 && u1 == 1 && v0 == 0 && v1 == 1; }
+};
+
+// Searches a piece of `patch` for points higher than `best->h` by more than `slack` (length, some ulp of
 // the body at least) and raises best. With f = d . wx - best w the patch is no higher where all Bernstein
 // coefficients of f - slack w are negative; a box where f is monotone in a parameter, or of degree one in it,
 // is replaced by its edges; where the Hessian's coefficients prove f concave, Newton finds its maximum and
 // the gradient left bounds it; every other box is halved. Exact up to round-off: a few ulp of |x|. No
 // allocation; 0.1 to 3 us a patch that has anything near the maximum. Hansen & Walster 2004, ch. 12, describe
 // the tests on intervals.
-void raise(const BezierPatch& patch, int index, const Vec3& d, double slack, Highest* best);
+void raise(const BezierPatch& patch, const PatchPiece& piece, const Vec3& d, double slack, Highest* best);
 
 }  // namespace nurbs

@@ -21,6 +21,7 @@
 #include "body/revolution.h"
 #include "body/rolling.h"
 #include "body/sphero_polyhedron.h"
+#include "body/support_cells.h"
 #include "nurbs/bezier_patch.h"
 #include "nurbs/nurbs_surface.h"
 #include "nurbs/tolerances.h"
@@ -166,6 +167,7 @@ struct Shape {
   NormalMap normal_map;                    // local bounds, for bodies with flats or dents
   DirectionAtlas atlas;
   LazyInnerMap lazy_inner_map;
+  SupportCells support_cells;  // where the hull's supports lie, near dents
   Ellipsoid ellipsoid;         // that the body is, if it is one
   Revolution revolution;       // about an axis, if the body is one
   Meridian meridian;           // whose profile this is; empty for other bodies

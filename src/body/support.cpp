@@ -313,15 +313,36 @@ Support climb(const Shape& shape, const Vec3& d, SurfacePoint at) {
   return best;
 }
 
-// The highest of all patches, knowing `low`, the height of some surface point and what it bounds.
-Support search_patches(const Shape& shape, const Vec3& d, const Support& low) {
-  const double slack = kSupportSlack * kRoundoff * shape.bounding_radius;
-  Highest top{low.where, low.h, low.h + slack, 0};
+double support_slack(const Shape& shape) {
+  return kSupportSlack * kRoundoff * shape.bounding_radius;
+}
+
+// Over all patches.
+void raise_all(const Shape& shape, const Vec3& d, Highest* top) {
+  const double slack = support_slack(shape);
   for (size_t p = 0; p < shape.patches.size(); ++p) {
     const PatchBall& ball = shape.balls[p];
-    if (d.dot(ball.center) + ball.radius > top.h + slack)
-      raise(shape.patches[p], static_cast<int>(p), d, slack, &top);
+    if (d.dot(ball.center) + ball.radius > top->h + slack)
+      raise(shape.patches[p], {static_cast<int>(p)}, d, slack, top);
   }
+}
+
+// The pieces of patches on which the support along d lies; nullptr where they are not kept: on bodies without
+// dents, in directions that the normal map promises something of, and while the body is made.
+const SupportCell* cell_of(const Shape& shape, const Vec3& d) {
+  if (!shape.dented() || shape.atlas.cells == 0 || shape.normal_map.radius_at(d) < kFarAway) return nullptr;
+  return shape.support_cells.at(shape, d);
+}
+
+// The highest of all patches, or of those of `cell`, knowing `low`, the height of some surface point and what
+// it bounds.
+Support search_patches(const Shape& shape, const Vec3& d, const Support& low, const SupportCell* cell) {
+  const double slack = support_slack(shape);
+  Highest top{low.where, low.h, low.h + slack, 0};
+  if (cell)
+    for (const PatchPiece& piece : cell->pieces) raise(shape.patches[piece.patch], piece, d, slack, &top);
+  else
+    raise_all(shape, d, &top);
   Support s;
   const Jet1 jet = evaluate1(shape.patches[top.where.patch], top.where.u, top.where.v);
   set_point(shape, d, top.where, jet.s, jet.su, jet.sv, &s);
@@ -380,14 +401,22 @@ Support find_support(const Shape& shape, const Vec3& d, const SurfacePoint* star
   if (Support s; find_on_meridian(shape, d, start, &s)) return s;
   const Support local = begin(shape, d, start);
   if (is_certain(shape, local, 0) || (shape.dented() && std::isfinite(local.upper))) return local;
-  return search_patches(shape, d, local);
+  return search_patches(shape, d, local, cell_of(shape, d));
 }
 
 Support find_hull_support(const Shape& shape, const Vec3& d, const SurfacePoint* start, double enough) {
   start = if_on_body(shape, start);
   if (Support s; find_on_meridian(shape, d, start, &s)) return s;
   const Support local = begin(shape, d, start);
-  return is_certain(shape, local, enough) ? local : search_patches(shape, d, local);
+  return is_certain(shape, local, enough) ? local : search_patches(shape, d, local, cell_of(shape, d));
+}
+
+Support search_all_patches(const Shape& shape, const Vec3& d, const SurfacePoint& at) {
+  Support low;
+  low.where = at;
+  low.h = d.dot(evaluate0(shape.patches[at.patch], at.u, at.v));
+  low.upper = std::numeric_limits<double>::infinity();
+  return search_patches(shape, d, low, nullptr);
 }
 
 Support confirm_support(const Shape& shape, const Vec3& d, const SurfacePoint& at) {
@@ -398,7 +427,7 @@ Support confirm_support(const Shape& shape, const Vec3& d, const SurfacePoint& a
   s.converged = true;
   if (is_certain(shape, s, 0)) return s;
   if (Support found; find_on_meridian(shape, d, &at, &found)) return found;
-  return search_patches(shape, d, s);
+  return search_patches(shape, d, s, cell_of(shape, d));
 }
 
 bool find_rival(const Shape& shape, const Vec3& d, const Support& best, Support* rival) {

@@ -32,6 +32,9 @@ Support find_support(const Shape& shape, const Vec3& d, const SurfacePoint* star
 Support find_hull_support(const Shape& shape, const Vec3& d, const SurfacePoint* start = nullptr,
                           double enough = 0);
 
+// The same from every patch, knowing no more than the height of one point: slow, for tables and tests.
+Support search_all_patches(const Shape& shape, const Vec3& d, const SurfacePoint& at);
+
 // The same knowing a point that has d as its normal, or nearly.
 Support confirm_support(const Shape& shape, const Vec3& d, const SurfacePoint& at);
 

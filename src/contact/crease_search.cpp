@@ -49,6 +49,20 @@ struct Branches {
   Support two[2], one;
 };
 
+// The supports near those of the step before; false if it has no such points.
+bool find_again(const PairFrame& pair, const Vec3& d, const JointSolution& s, const Bridge& bridge,
+                Branches* out) {
+  out->of_a = bridge.of_a != 0;
+  const Shape &two = out->of_a ? *pair.a : *pair.b, &one = out->of_a ? *pair.b : *pair.a;
+  const Vec3 on_b = pair.direction_on_b(d), on_two = out->of_a ? d : on_b, on_one = out->of_a ? on_b : d;
+  const SurfacePoint other{static_cast<int>(bridge.patch), bridge.u, bridge.v};
+  if (!(bridge.patch < static_cast<double>(two.patches.size())) || !other.on_patch()) return false;
+  out->two[0] = find_support(two, on_two, out->of_a ? &s.points.on_a : &s.points.on_b);
+  out->two[1] = find_support(two, on_two, &other);
+  out->one = find_support(one, on_one, out->of_a ? &s.points.on_b : &s.points.on_a);
+  return true;
+}
+
 // The body near a dent whose two supports are nearest to equally high.
 bool find_branches(const PairFrame& pair, const Vec3& d, const JointSolution& s, Branches* out) {
   const Vec3 on_b = pair.direction_on_b(d);
@@ -98,12 +112,13 @@ bool meet_crease(const PairFrame& pair, const Vec3& direction, double tolerance,
 }
 
 bool meet_bridge(const PairFrame& pair, const Vec3& direction, double tolerance, double tilt,
-                 JointSolution* s) {
+                 JointSolution* s, Bridge* bridge) {
   if (!pair.a->dented() && !pair.b->dented()) return false;
   Vec3 d = direction;
   Branches at;
-  if (!find_branches(pair, d, *s, &at)) return false;
-  double share = -1;  // l; below 0: not known
+  const bool known = bridge->known();
+  if (!(known ? find_again(pair, d, *s, *bridge, &at) : find_branches(pair, d, *s, &at))) return false;
+  double share = known ? bridge->share : -1;  // l; below 0: not known
   for (int k = 0; k < kBridgeIterations; ++k) {
     const Vec3 on_b = pair.direction_on_b(d);
     if (k > 0) {  // each from where it was
@@ -150,7 +165,8 @@ bool meet_bridge(const PairFrame& pair, const Vec3& direction, double tolerance,
     if (step.norm() <= tilt && std::abs(next - share) * length <= kStationary * pair.reach + tilt * length) {
       PointPair points;
       const Vec3 met = next * x[0] + (1 - next) * x[1];
-      const Support& nearer = at.two[next >= 0.5 ? 0 : 1];
+      const bool first = next >= 0.5;
+      const Support &nearer = at.two[first ? 0 : 1], &other_one = at.two[first ? 1 : 0];
       points.a = at.of_a ? met : y;
       points.b = at.of_a ? y : met;
       points.on_a = at.of_a ? nearer.where : at.one.where;
@@ -170,6 +186,8 @@ bool meet_bridge(const PairFrame& pair, const Vec3& direction, double tolerance,
           bracket_along(pair, d, upper, points, at.of_a ? between : other, at.of_a ? other : between);
       if (!(bracket.width() <= tolerance)) return false;
       s->set_met(points, bracket, k + 1);
+      *bridge = {static_cast<double>(other_one.where.patch), other_one.where.u, other_one.where.v,
+                 at.of_a ? 1.0 : 0.0, first ? next : 1 - next};
       return true;
     }
     share = next;

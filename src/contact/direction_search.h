@@ -12,6 +12,7 @@ struct DirectionGuess {
 
 // p(d) = h_A(d) + h_B(-d) - d . offset from the atlases: an upper bound for any unit d. About 20 ns.
 double atlas_overlap(const PairFrame& pair, const Vec3& d);
+void atlas_overlaps(const PairFrame& pair, const Triple<Lane4>& d, Lane4* p);  // of four at once
 
 // Along the line of centres; returns how many guesses that makes (0 for concentric bodies).
 int guess_from_centres(const PairFrame& pair, DirectionGuess* guess);

@@ -22,6 +22,8 @@ namespace {
 
 constexpr double kGuessAbove = 0.1;    // of the smaller radius: a guess that much above the lowest is none
 constexpr double kSameGuess = 0.9995;  // cosine between refined guesses: the atlases tell no more apart
+constexpr double kOnFeature = 0.97;    // cosine between a direction and its support's normal: less on an edge
+constexpr double kNearlyClosed = 100;  // tolerances
 constexpr double kNormalShare = 0.5;   // of the tolerance, by which the overlap along a normal may exceed it
 
 bool set_separated(double lower, double reach, Rung rung, ContactResult* r) {
@@ -104,15 +106,12 @@ class Ladder {
 
   // Rung 4: Newton from where the contact would be, had it moved on as it last did.
   bool warm(const PairFrame& pair, double tolerance, ContactResult* r) {
-    if (meet_on_flat(pair, tolerance, r)) return true;
+    if (meet_on_flat(pair, tolerance, r) || stay_on_bridge(pair, tolerance, r)) return true;
     JointSolution s = solve_joint(pair, warm_point(memory_.on_a, *pair.a), warm_point(memory_.on_b, *pair.b),
                                   tolerance, settings_.reach, kWarmIterations);
     r->iterations = s.iterations;
     if (!s.converged && !confirm(pair, tolerance, s)) {
-      if (meet_edge(pair, tolerance, &s)) {
-        *r = finish(pair, s, s.normal, Rung::warm, s.iterations);
-        return true;
-      }
+      if (meet_edge(pair, tolerance, &s, r)) return true;
       if (!is_too_deep(s)) return false;
       *r = deep(pair, tolerance, s);
       return true;
@@ -153,25 +152,61 @@ class Ladder {
   }
 
   // A contact on a crease or over a dent, where the surfaces have no common normal.
-  bool meet_edge(const PairFrame& pair, double tolerance, JointSolution* s) const {
+  bool meet_edge(const PairFrame& pair, double tolerance, JointSolution* s, ContactResult* r) {
     if (memory_.proof.contact == 0 || !has_proof(memory_.proof) || (pair.a->smooth && pair.b->smooth))
       return false;
     const Vec3 d = last_direction(pair);
-    return meet_bridge(pair, d, tolerance, settings_.tolerance, s) ||
-           meet_crease(pair, d, tolerance, settings_.tolerance, s);
+    Bridge bridge;
+    if (!meet_bridge(pair, d, tolerance, settings_.tolerance, s, &bridge) &&
+        !meet_crease(pair, d, tolerance, settings_.tolerance, s))
+      return false;
+    *r = finish(pair, *s, s->normal, Rung::warm, s->iterations);
+    if (bridge.known()) remember_bridge(bridge, *r);
+    return true;
+  }
+
+  // The dent that the contact lay over the last time.
+  bool stay_on_bridge(const PairFrame& pair, double tolerance, ContactResult* r) {
+    if (memory_.model.unique != kBridge || memory_.proof.contact == 0 || !has_proof(memory_.proof))
+      return false;
+    Bridge bridge;
+    std::memcpy(static_cast<void*>(&bridge), &memory_.model, sizeof bridge);
+    JointSolution s;
+    s.iterations = 0;
+    s.points.on_a = surface_point(memory_.on_a);
+    s.points.on_b = surface_point(memory_.on_b);
+    if (!lies_on(*pair.a, s.points.on_a) || !lies_on(*pair.b, s.points.on_b) ||
+        !meet_bridge(pair, last_direction(pair), tolerance, settings_.tolerance, &s, &bridge))
+      return false;
+    *r = finish(pair, s, s.normal, Rung::warm, s.iterations);
+    remember_bridge(bridge, *r);
+    return true;
+  }
+
+  void remember_bridge(const Bridge& bridge, const ContactResult& r) {
+    if (r.status != Status::converged) return;
+    static_assert(sizeof bridge <= 28 * sizeof(double), "in the place of the model's halves");
+    std::memcpy(static_cast<void*>(&memory_.model), &bridge, sizeof bridge);
+    memory_.model.unique = kBridge;
   }
 
   // A minimum of p that may not be the only one, whatever certificate: the polytope finds the others.
   static bool is_too_deep(const JointSolution& s) { return s.stationary && -s.gap > s.bracket.unique; }
 
-  // Newton from the supports along a guessed direction, certified or not.
-  JointSolution polish(const PairFrame& pair, const DirectionGuess& guess, double tolerance) const {
+  // Newton from the supports along a guessed direction, certified or not. False where a support lies on an
+  // edge or a vertex: its surfaces have no such normal.
+  bool polish(const PairFrame& pair, const DirectionGuess& guess, double tolerance, JointSolution* joint,
+              int* spent) const {
+    ++*spent;
+    const Vec3 on_b = pair.direction_on_b(guess.d);
     const Support a = find_hull_support(*pair.a, guess.d);
-    const Support b = find_hull_support(*pair.b, pair.direction_on_b(guess.d));
-    JointSolution joint = solve_joint(pair, a.where, b.where, tolerance, settings_.reach, kPolishIterations);
-    if (!joint.converged) confirm(pair, tolerance, joint);
-    ++joint.iterations;
-    return joint;
+    if (a.normal.dot(guess.d) < kOnFeature) return false;
+    const Support b = find_hull_support(*pair.b, on_b);
+    if (b.normal.dot(on_b) < kOnFeature) return false;
+    *joint = solve_joint(pair, a.where, b.where, tolerance, settings_.reach, kPolishIterations);
+    if (!joint->converged) confirm(pair, tolerance, *joint);
+    *spent += joint->iterations;
+    return true;
   }
 
   // The minimum of the last step as long as its proof lasts; then that and another proof, if they can be had.
@@ -195,7 +230,9 @@ class Ladder {
   // The line of centres leads to most contacts, and the certificate says when it did not: then the basins of
   // a scan over all directions, the lowest first, each once. Of bodies with creases or flats only the lowest
   // basin: there Newton seldom finds what it did not at first, and the polytope costs less than a few tries.
+  // Where both bodies are a few points it costs less than the first.
   ContactResult cold(const PairFrame& pair, double tolerance, int spent) {
+    if (of_points(pair, tolerance)) return fallback(pair, nullptr, pair.offset, tolerance, spent);
     DirectionGuess guesses[kColdGuesses + 1];
     int found = guess_from_centres(pair, guesses), tried = 0;
     JointSolution best;
@@ -206,8 +243,8 @@ class Ladder {
       const double most = lowest_of(guesses, found).p + (round ? kGuessAbove * pair.size : 0);
       for (; tried < found; ++tried) {
         if (scanned && (guesses[tried].p > most || is_known(guesses, tried))) continue;
-        const JointSolution joint = polish(pair, guesses[tried], tolerance);
-        spent += joint.iterations;
+        JointSolution joint;
+        if (!polish(pair, guesses[tried], tolerance, &joint, &spent)) continue;
         if (joint.converged) return finish(pair, joint, joint.normal, Rung::cold, spent);
         if (!joint.stationary || (have && joint.gap <= best.gap)) continue;
         best = joint;
@@ -225,6 +262,11 @@ class Ladder {
     if (meet_flat(pair, seed, tolerance, &flat))
       return finish(pair, flat, flat.normal, Rung::cold, flat.iterations);
     return fallback(pair, have ? &best : nullptr, seed, tolerance, spent);
+  }
+
+  static bool of_points(const PairFrame& pair, double tolerance) {
+    return PairFrame::is_swept(*pair.a, pair.scale_a, tolerance) &&
+           PairFrame::is_swept(*pair.b, pair.scale_b, tolerance);
   }
 
   static const DirectionGuess& lowest_of(const DirectionGuess* guesses, int count) {
@@ -278,6 +320,15 @@ class Ladder {
       return finish(pair, deep, deep.normal, Rung::fallback, spent + deep.iterations);
     PolytopeResult hull = solve_polytope(pair, known ? known->normal : seed, tolerance, settings_.reach);
     spent += hull.iterations;
+    // Whether a bracket closes that lacks little may depend on where the hull began.
+    if (!hull.converged && !(hull.bracket.lower > settings_.reach) &&
+        hull.bracket.width() <= kNearlyClosed * tolerance) {
+      const PolytopeResult again = solve_polytope(pair, -hull.bracket.direction, tolerance, settings_.reach);
+      spent += again.iterations;
+      if (again.bracket.width() < hull.bracket.width()) hull = again;
+    }
+    if (hull.converged && of_points(pair, tolerance))
+      return finish(pair, hull, hull.bracket.direction, Rung::fallback, spent);
     JointSolution joint;
     bool polished = false;
     if (known && known->gap <= hull.bracket.upper && known->gap >= hull.bracket.lower - tolerance) {

@@ -227,9 +227,9 @@ class Search {
     r.points.b = b - shrink_b_ * direction_;
     r.points.on_a = w.on_a;
     r.points.on_b = w.on_b;
-    if (points_) {
-      r.points.on_a = find_hull_support(*pair_.a, direction_).where;
-      r.points.on_b = find_hull_support(*pair_.b, pair_.direction_on_b(direction_)).where;
+    if (points_) {  // where to begin the next time, no more
+      r.points.on_a = find_hull_support(*pair_.a, direction_, nullptr, kFarAway).where;
+      r.points.on_b = find_hull_support(*pair_.b, pair_.direction_on_b(direction_), nullptr, kFarAway).where;
     }
     const double apart = direction_.dot(r.points.b - r.points.a);
     // Where the bracket stayed open, the least overlap seen: the hull errs to first order, the direction to

@@ -164,6 +164,11 @@ constexpr int kConcaveSteps = 8;        // of Newton in a concave box
 constexpr double kConcaveRest = 1e-6;   // of the slack: what the gradient left may hide
 constexpr double kSupportSlack = 2;     // round-offs of a body that its support may lack
 
+// --- where supports lie near dents
+constexpr int kSupportCells = 64;             // per cube edge, as the normal map's
+constexpr int kSupportPieces = 16;            // of a patch's parameters: pieces end at multiples of these
+constexpr double kSupportCellMargin = 2e-14;  // of the body: round-off of the heights compared
+
 // --- particles
 constexpr double kUnitTurn = 1e-14;  // of a quaternion's squared length: within it the body is its own size
 

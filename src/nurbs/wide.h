@@ -130,10 +130,12 @@ NURBS_INLINE Vec3 vec(const Triple<double>& v) {
 }
 
 // One lane's vector, in and out; masks as bits, one a lane.
-NURBS_INLINE Vec3 lane(const Triple<Wide>& v, int l) {
+template <class Real>
+NURBS_INLINE Vec3 lane(const Triple<Real>& v, int l) {
   return {v.x[l], v.y[l], v.z[l]};
 }
-NURBS_INLINE void set_lane(const Triple<double>& from, int l, Triple<Wide>* to) {
+template <class Real>
+NURBS_INLINE void set_lane(const Triple<double>& from, int l, Triple<Real>* to) {
   to->x[l] = from.x;
   to->y[l] = from.y;
   to->z[l] = from.z;

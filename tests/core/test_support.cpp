@@ -81,6 +81,12 @@ TEST(Atlas, bounds_the_support_from_above_and_closely) {
       const double h = find_hull_support(*shape, d).h, upper = shape->atlas.support_upper(d);
       ASSERT_GE(upper, h) << shape->name;
       loosest = std::max(loosest, upper - h);
+      Triple<Lane4> four;
+      for (int l = 0; l < 4; ++l) set_lane(triple(l == k % 4 ? d : random.direction()), l, &four);
+      Lane4 uppers;
+      shape->atlas.support_upper(four, &uppers);
+      for (int l = 0; l < 4; ++l)
+        ASSERT_NEAR(uppers[l], shape->atlas.support_upper(lane(four, l)), 1e-14 * shape->bounding_radius);
     }
     EXPECT_LT(loosest, 0.05 * shape->bounding_radius) << shape->name;
   }
@@ -93,6 +99,11 @@ TEST(Atlas, is_homogeneous_and_agrees_with_its_nodes) {
     EXPECT_NEAR(atlas.support_upper(3 * d), 3 * atlas.support_upper(d), 1e-14);
     EXPECT_LT((atlas.direction(atlas.nearest(d)) - d).norm(), 1e-15);
     EXPECT_NEAR(atlas.support_upper(d), d.dot(atlas.point[node]), 1e-13);
+    Triple<Lane4> nodes;
+    for (int l = 0; l < 4; ++l) set_lane(triple(d), l, &nodes);
+    Lane4 uppers;
+    atlas.support_upper(nodes, &uppers);
+    EXPECT_NEAR(uppers[node % 4], d.dot(atlas.point[node]), 1e-13);
   }
 }
 
