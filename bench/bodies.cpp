@@ -8,7 +8,7 @@ namespace nurbs::bench {
 const std::vector<Body>& smooth_bodies() {
   static const std::vector<Body> bodies = [] {
     const Vec3 ellipsoid(1, 0.8, 0.6), disc(1, 1, 0.1);
-    return std::vector<Body>{
+    std::vector<Body> made{
         {"ellipsoid", "exact ellipsoid 1 : 0.8 : 0.6",
          test::as_surface(*make_shape("ellipsoid", exact_ellipsoid(ellipsoid))), ellipsoid},
         {"pebble", "pebble, bicubic", make_shape("pebble", pebble()), Vec3::Zero()},
@@ -16,6 +16,8 @@ const std::vector<Body>& smooth_bodies() {
          make_shape("blocky", fitted_superellipsoid(Vec3(1, 0.9, 0.8), 4, 3)), Vec3::Zero()},
         {"disc", "exact ellipsoid 1 : 1 : 0.1", test::as_surface(*make_shape("disc", exact_ellipsoid(disc))),
          disc}};
+    for (const Body& body : made) body.shape->inner_map();  // as a run does
+    return made;
   }();
   return bodies;
 }

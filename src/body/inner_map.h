@@ -7,6 +7,7 @@
 #include <atomic>
 #include <memory>
 #include <mutex>
+#include <utility>
 #include <vector>
 
 #include "nurbs/types.h"
@@ -33,6 +34,11 @@ struct InnerNode {
   std::array<float, 4> radius = {0, 0, 0, 0};
 };
 static_assert(sizeof(InnerNode) == 64, "a line of cache");
+template <class Archive>
+void archive(Archive& a, InnerNode& s) {
+  auto& [point, normal, radius] = s;
+  a(point, normal, radius);
+}
 
 // The same, finer, and for bodies that bend much more one way than the other: in a cell of a cube map, within
 // kStretchCaps[k] of its middle,
@@ -41,6 +47,11 @@ struct InnerStretch {
   std::array<float, 3> along = {0, 0, 0};  // unit, square to the middle
   std::array<float, 3> least = {0, 0, 0}, most = {0, 0, 0};
 };
+template <class Archive>
+void archive(Archive& a, InnerStretch& s) {
+  auto& [along, least, most] = s;
+  a(along, least, most);
+}
 
 struct InnerMap {
   std::vector<InnerNode> nodes;  // none: the hypotheses do not hold
@@ -48,35 +59,46 @@ struct InnerMap {
   static int cell(const Vec3& d);  // that d lies in
   static Vec3 middle(int cell);    // unit, at most 0.045 rad from all that lies in it
 };
+template <class Archive>
+void archive(Archive& a, InnerMap& s) {
+  auto& [nodes, stretches] = s;
+  a(nodes, stretches);
+}
 
 // Of a shape that is done. From leaves, whose normals and curvatures are proven; the normals between the
 // sides of an opening joint have radius 0, as a crease has. Some tens of ms, 330 kB.
 InnerMap make_inner_map(const Shape& shape);
 
-// A shape's inner map, made when it is first asked for: bodies that seldom overlap deeply do without. Copies
-// share it, and any thread may ask.
+// A shape's inner map, made when it is asked for: before a run, as it costs more than many contacts. Pairs
+// use those that are there, and ask themselves only where they find no answer otherwise. Copies share it, and
+// any thread may ask.
 class LazyInnerMap {
  public:
   const InnerMap& of(const Shape& shape) const {
-    std::call_once(made_->once, [&] {
-      made_->map = make_inner_map(shape);
-      made_->done = true;
-    });
+    std::call_once(made_->once, [&] { put(make_inner_map(shape)); });
     return made_->map;
   }
-  // Whether it is there, or has been done without so often that making it costs no more. Counts the calls.
-  bool pays() const { return made_->done || ++made_->without > kDoneWithout; }
   bool made() const { return made_->done; }
-
-  static constexpr int kDoneWithout = 128;  // some 0.1 ms each
+  // Empty if it is not made.
+  const InnerMap& known() const {
+    static const InnerMap none;
+    return made_->done ? made_->map : none;
+  }
+  // One made elsewhere, of the same shape.
+  void set(InnerMap map) const {
+    std::call_once(made_->once, [&] { put(std::move(map)); });
+  }
 
  private:
   struct Made {
     std::once_flag once;
     std::atomic<bool> done{false};
-    std::atomic<int> without{0};
     InnerMap map;
   };
+  void put(InnerMap map) const {
+    made_->map = std::move(map);
+    made_->done = true;
+  }
   std::shared_ptr<Made> made_ = std::make_shared<Made>();
 };
 

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "nurbs/bernstein.h"
 #include "nurbs/tolerances.h"
@@ -164,11 +165,16 @@ struct Part {
   }
 };
 
-// f / w of a part.
-Jet quotient(const Part& part, double t) {
-  const Jet f = evaluate(part.f, part.degree, t), w = evaluate(part.w, part.degree, t);
+Jet quotient(const Jet& f, const Jet& w) {
   const double over = 1 / w.f, q = f.f * over, q1 = (f.f1 - q * w.f1) * over;
   return {q, q1, (f.f2 - 2 * q1 * w.f1 - q * w.f2) * over};
+}
+// f / w of a part.
+Jet quotient(const Part& part, double t) {
+  return quotient(evaluate(part.f, part.degree, t), evaluate(part.w, part.degree, t));
+}
+Jet quotient(const Meridian::Piece& piece, const Row& row, double t) {
+  return quotient(evaluate(row, piece.degree, t), evaluate(piece.w, piece.degree, t));
 }
 
 // Whether f - above w is concave all over the part, and by its slope where it is `at` rises by less than more
@@ -185,11 +191,28 @@ bool concave_below(const Part& part, double above, const Jet& at, double weight_
   return rise <= more * least;
 }
 
+// Place number of a table over directions of the half plane, from -axis to axis.
+double place_in_table(double dr, double dz) {
+  return 0.5 * kMeridianStarts * (1 + dz / (dr + std::abs(dz)));
+}
+
 class ProfileSearch {
  public:
   ProfileSearch(const Meridian& m, double dr, double dz, double size)
       : m_(m), dr_(dr), dz_(dz), size_(size) {}
 
+  // From the table, or from `last` where that is no lower: on a line it stays there.
+  bool run_from_table(const Meridian::Place& last) {
+    const double place = place_in_table(dr_, dz_);
+    const int low = std::clamp(static_cast<int>(place), 0, kMeridianStarts - 1);
+    Meridian::Place from = m_.starts[low];
+    if (const Meridian::Place& next = m_.starts[low + 1]; next.piece == from.piece)
+      from.t += std::clamp(place - low, 0.0, 1.0) * (next.t - from.t);
+    else if (place - low > 0.5)
+      from = next;
+    if (last.piece >= 0 && height_at(last) >= height_at(from) - slack()) from = last;
+    return run(from);
+  }
   // From the start; whether it is proven that nothing is higher than height() + slack().
   bool run(const Meridian::Place& start) {
     Part part = whole(start.piece, 0);
@@ -291,11 +314,6 @@ class ProfileSearch {
   double level_ = 0, above_ = 0;
   Meridian::Place best_;
 };
-
-// Place number of a table over directions of the half plane, from -axis to axis.
-double place_in_table(double dr, double dz) {
-  return 0.5 * kMeridianStarts * (1 + dz / (dr + std::abs(dz)));
-}
 
 // --- round the axis
 
@@ -414,27 +432,49 @@ Meridian make_meridian(const std::vector<BezierPatch>& patches, const Revolution
   return m;
 }
 
+ProfileBend profile_bend(const Meridian& m, const Meridian::Place& at, const Vec2& d, const Vec2& asked,
+                         double size) {
+  const Meridian::Piece& piece = m.pieces[at.piece];
+  const Jet r = quotient(piece, piece.r, at.t), z = quotient(piece, piece.z, at.t);
+  const double speed2 = r.f1 * r.f1 + z.f1 * z.f1, speed = std::sqrt(speed2),
+               slope = asked[0] * r.f1 + asked[1] * z.f1, bend = -(d[0] * r.f2 + d[1] * z.f2);
+  if (!(speed > kHeldSpeed * size) || (at.t <= kOnEdge && slope < -kHeldSlope * speed) ||
+      (at.t >= 1 - kOnEdge && slope > kHeldSlope * speed))
+    return {r.f, 0};
+  const bool bent = bend * size > kFlatCurvature * speed2;
+  return {r.f, bent ? speed2 / bend : std::numeric_limits<double>::infinity()};
+}
+
+bool find_profile_point(const Meridian& m, double dr, double dz, double size, const Meridian::Place& start,
+                        ProfilePoint* found) {
+  ProfileSearch search(m, dr, dz, size);
+  if (!search.run_from_table(start)) return false;
+  found->place = search.best();
+  const Meridian::Piece& piece = m.pieces[found->place.piece];
+  const Jet r = quotient(piece, piece.r, found->place.t), z = quotient(piece, piece.z, found->place.t);
+  const double speed = std::hypot(r.f1, z.f1), side = dr * z.f1 - dz * r.f1 < 0 ? -1 : 1;
+  found->r = r.f;
+  found->z = z.f;
+  const bool normal = speed > kHeldSpeed * size;
+  found->turn_r = normal ? side * z.f1 / speed : dr;
+  found->turn_z = normal ? -side * r.f1 / speed : dz;
+  found->upper = search.height() + search.slack();
+  return true;
+}
+
 bool find_meridian_support(const Meridian& m, const Vec3& d, double size, const SurfacePoint* start,
                            MeridianSupport* found) {
   const Vec3 e = m.axes * d;
   const double dr = std::hypot(e[0], e[1]);
   const bool started = start && m.sector_of[start->patch] >= 0;
   const Meridian::Sector* last = started ? &m.sectors[m.sector_of[start->patch]] : nullptr;
-
-  const double place = place_in_table(dr, e[2]);
-  const int low = std::clamp(static_cast<int>(place), 0, kMeridianStarts - 1);
-  Meridian::Place from = m.starts[low];
-  if (const Meridian::Place& next = m.starts[low + 1]; next.piece == from.piece)
-    from.t += std::clamp(place - low, 0.0, 1.0) * (next.t - from.t);
-  else if (place - low > 0.5)
-    from = next;
-  ProfileSearch search(m, dr, e[2], size);
-  if (last) {  // no lower: there it begins, and on a line it stays there
+  Meridian::Place from;
+  if (last) {
     const double t = last->arcs_in_u ? start->v : start->u;
-    const Meridian::Place here{piece_swept(m, *last), last->backwards ? 1 - t : t};
-    if (search.height_at(here) >= search.height_at(from) - kRoundoff * size) from = here;
+    from = {piece_swept(m, *last), last->backwards ? 1 - t : t};
   }
-  if (!search.run(from)) return false;
+  ProfileSearch search(m, dr, e[2], size);
+  if (!search.run_from_table(from)) return false;
   const Meridian::Place best = search.best();
   const Meridian::Piece& piece = m.pieces[best.piece];
 

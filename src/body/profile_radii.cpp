@@ -18,6 +18,7 @@ constexpr double kLeafSpread = 0.98;     // least over largest radius of a leaf 
 constexpr double kNearlyStraight = 1e3;  // ... unless it bends by less than this over the body's size
 constexpr double kSameEnd = 1e-12;       // of the body's size
 constexpr double kBesideCell = 1e-9;     // cells: round-off of a normal's place
+constexpr double kWidestReach = 0.5;     // rad
 
 using Row = Bernstein<double>;
 using Rows = Bernstein<Vec2>;
@@ -39,6 +40,31 @@ Cells cells_of(double from, double to) {
   };
   return {cell(std::min(from, to) * kProfileCells - kBesideCell),
           cell(std::max(from, to) * kProfileCells + kBesideCell)};
+}
+
+// Of minima over 2, 4, .. cells, before the cells; the first number means nothing.
+std::vector<float> tree_of(const std::vector<float>& cells) {
+  const std::size_t count = cells.size();
+  std::vector<float> tree(count, 0);
+  tree.insert(tree.end(), cells.begin(), cells.end());
+  for (std::size_t k = count - 1; k > 0; --k) tree[k] = std::min(tree[2 * k], tree[2 * k + 1]);
+  return tree;
+}
+
+// From the axis; 0 where round-off leaves the support open.
+std::vector<float> distances(const Meridian& m, double size) {
+  std::vector<float> least(kProfileCells);
+  float before = 0;
+  for (int k = 0; k <= kProfileCells; ++k) {
+    const double at = 2.0 * k / kProfileCells - 1, dr = 1 - std::abs(at), length = std::hypot(dr, at);
+    ProfilePoint p;
+    const bool found = find_profile_point(m, dr / length, at / length, size, {}, &p);
+    const float here =
+        found && p.r > 0 ? std::nextafter(static_cast<float>(p.r * (1 - kBesideCell)), 0.0F) : 0.0F;
+    if (k > 0) least[k - 1] = std::min(before, here);
+    before = here;
+  }
+  return least;
 }
 
 double largest(const Row& row) {
@@ -193,15 +219,23 @@ class Painter {
 
 }  // namespace
 
-double ProfileRadii::within(double cosine, double sine, double reach) const {
-  if (least.empty() || !(reach < 0.5)) return 0;
+ProfileRadii::Bounds ProfileRadii::within(double cosine, double sine, double reach) const {
+  if (least.empty() || !(reach < kWidestReach)) return {0, 0};
   const double c = std::cos(reach), s = std::sin(reach);
   const Vec2 low(sine * c - cosine * s, cosine * c + sine * s),
       high(sine * c + cosine * s, cosine * c - sine * s);
   const Cells cells = cells_of(place_of(low), place_of(high));
-  float radius = least[cells.first];
-  for (int k = cells.first + 1; k <= cells.last; ++k) radius = std::min(radius, least[k]);
-  return radius;
+  float radius = least[kProfileCells + cells.first], distance = around[kProfileCells + cells.first];
+  int from = cells.first + kProfileCells, to = cells.last + kProfileCells + 1;
+  const auto take = [&](int node) {
+    radius = std::min(radius, least[node]);
+    distance = std::min(distance, around[node]);
+  };
+  for (; from < to; from /= 2, to /= 2) {
+    if (from % 2 == 1) take(from++);
+    if (to % 2 == 1) take(--to);
+  }
+  return {radius, distance};
 }
 
 ProfileRadii make_profile_radii(const Meridian& m, const std::vector<BezierPatch>& patches, double size) {
@@ -210,7 +244,7 @@ ProfileRadii make_profile_radii(const Meridian& m, const std::vector<BezierPatch
   for (const Meridian::Piece& piece : m.pieces)
     if (!painter.paint(piece, profile_turn(m, piece, patches, size))) return {};
   if (!painter.paint_kinks()) return {};
-  return {painter.radii()};
+  return {tree_of(painter.radii()), tree_of(distances(m, size))};
 }
 
 }  // namespace nurbs

@@ -175,7 +175,8 @@ struct Shape {
   SpheroPolyhedron core;       // hull of points, and a ball, that the body is, if it is one
   FlatFeatures flats;          // faces, creases and ruled lines; empty for round bodies
 
-  // Balls inside the body over directions.
+  // Balls inside the body over directions, which spare deep contacts of round bodies a search. Made the first
+  // time, before a run: 10 to 100 ms.
   const InnerMap& inner_map() const { return lazy_inner_map.of(*this); }
   // Whether a local maximum of d . x may be no global one.
   bool dented() const { return support_excess > kRoundoff * bounding_radius; }

@@ -4,8 +4,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "body/support_turn.h"
 #include "contact/certificate.h"
-#include "contact/support_turn.h"
 
 namespace nurbs {
 namespace {

@@ -5,8 +5,8 @@
 #include <cmath>
 
 #include "body/support.h"
+#include "body/support_turn.h"
 #include "contact/certificate.h"
-#include "contact/support_turn.h"
 #include "nurbs/tolerances.h"
 
 namespace nurbs {

@@ -105,8 +105,8 @@ class DeepSearch {
  public:
   DeepSearch(const PairFrame& pair, double tolerance)
       : pair_(pair),
-        inner_a_(pair.inner_map(*pair.a)),
-        inner_b_(pair.inner_map(*pair.b)),
+        inner_a_(pair.a->lazy_inner_map.known()),
+        inner_b_(pair.b->lazy_inner_map.known()),
         tolerance_(tolerance),
         noise_(8 * kRoundoff * pair.reach),
         widest_(pair.scale_a * pair.a->patch_curvature.max_radius +

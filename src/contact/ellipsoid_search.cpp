@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "contact/ellipsoid_overlap.h"
+
 namespace nurbs {
 namespace {
 
@@ -27,6 +29,12 @@ Placed put(const Particle& p, double (&root)[6], double& least2) {
   return place_ellipsoid(root, least2, turn(p.q.toRotationMatrix()));
 }
 
+SweptEllipsoid swept_ellipsoid(const Particle& p) {
+  const Ellipsoid& e = p.shape->ellipsoid;
+  const Mat3 turn = p.q.toRotationMatrix();
+  return {p.scale * (turn * e.root * turn.transpose()), p.scale * e.least(), p.scale * e.semi.maxCoeff(), 0};
+}
+
 // A pair of bodies and how well it is to be solved.
 struct Problem {
   Placed a, b;
@@ -36,7 +44,7 @@ struct Problem {
 };
 
 struct Solution {
-  V d;
+  V d{};
   EllipsoidContactOf<double> contact;
   int iterations = 0;
 };
@@ -83,6 +91,20 @@ bool descend(const Problem& q, V d, Solution* out) {
     if (turn < kEllipsoidStalled && !(out->contact.beyond < kFarAway)) return false;
   }
   return false;
+}
+
+// Of overlaps beyond the balls of the certificate.
+bool descend_deep(const Problem& q, const Particle& a, const Particle& b, double allowed, Solution* out) {
+  const Vec3 start = dot(out->d, out->d) > 0 ? vec(out->d) : Vec3(Vec3::UnitX());
+  LeastOverlap least;
+  if (!find_least_overlap(swept_ellipsoid(a), swept_ellipsoid(b), vec(q.offset), start, 0.5 * allowed,
+                          &least))
+    return false;
+  out->d = triple(least.direction);
+  out->contact = look_along(q.a, q.b, q.offset, 1.0, out->d);
+  out->contact.beyond = least.overlap - least.level;
+  out->iterations += least.tests;
+  return true;
 }
 
 // Directions to start from: where the contact would be, had it moved on as it last did; the line of centres.
@@ -157,7 +179,7 @@ bool solve_ellipsoids(const Particle& a, const Particle& b, const ContactSetting
   q.reach = settings.reach;
   Solution s;
   ContactResult found;
-  if (!solve(q, memory, &s) ||
+  if (!(solve(q, memory, &s) || descend_deep(q, a, b, allowed, &s)) ||
       !set_result(s, pair.error * (ra + rb) + q.noise, allowed, settings.reach, &found))
     return give_up(&memory);
   *r = found;

@@ -14,12 +14,11 @@ struct PairFrame {
   const Shape* a;
   const Shape* b;
   double scale_a, scale_b;
-  Mat3 axes_a;             // A's shape axes into the lab
-  Mat3 turn;               // B's shape axes into A's
-  Vec3 offset;             // B's centre of mass
-  double size;             // smaller bounding radius of the two, the scale of `tolerance`
-  double reach;            // larger of them, the scale of round-off
-  bool inner_maps = true;  // are used, and made if need be
+  Mat3 axes_a;   // A's shape axes into the lab
+  Mat3 turn;     // B's shape axes into A's
+  Vec3 offset;   // B's centre of mass
+  double size;   // smaller bounding radius of the two, the scale of `tolerance`
+  double reach;  // larger of them, the scale of round-off
 
   PairFrame(const Particle& pa, const Particle& pb)
       : a(pa.shape), b(pb.shape), scale_a(pa.scale), scale_b(pb.scale), axes_a(pa.q.toRotationMatrix()) {
@@ -28,12 +27,6 @@ struct PairFrame {
     const double ra = scale_a * a->bounding_radius, rb = scale_b * b->bounding_radius;
     size = ra < rb ? ra : rb;
     reach = ra < rb ? rb : ra;
-  }
-
-  // Of A's or B's shape; empty where maps are not used.
-  const InnerMap& inner_map(const Shape& shape) const {
-    static const InnerMap none;
-    return inner_maps ? shape.inner_map() : none;
   }
 
   // Whether points and a ball stand for a body of the pair, to little more than round-off of the tolerance.

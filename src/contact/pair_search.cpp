@@ -213,12 +213,11 @@ class Ladder {
   ContactResult deep(const PairFrame& pair, double tolerance, JointSolution& s) {
     static_assert(sizeof(DeepProof) <= 28 * sizeof(double), "in the place of the model's halves");
     const bool proven = memory_.model.unique == kDeepProof;
-    if (!proven && !inner_maps_pay()) return without_maps(pair, &s, s.normal, tolerance, s.iterations);
     DeepProof proof;
     std::memcpy(&proof, &memory_.model, sizeof proof);
     const bool lasts = proven && still_deepest(pair, tolerance, proof, &s);
     if (!lasts && !(search_deep(pair, tolerance, &s, &proof) && s.converged))
-      return bracket(pair, &s, s.normal, tolerance, s.iterations);
+      return fallback(pair, &s, s.normal, tolerance, s.iterations);
     const ContactResult r = finish(pair, s, s.normal, lasts ? Rung::warm : Rung::fallback, s.iterations);
     if (r.status == Status::converged && proof.level > 0) {
       std::memcpy(static_cast<void*>(&memory_.model), &proof, sizeof proof);
@@ -287,26 +286,15 @@ class Ladder {
     return -pair.overlap_along(s.normal, a.h, b.h) >= gap - kNormalShare * tolerance;
   }
 
-  bool inner_maps_pay() const {
-    const bool a = a_.shape->lazy_inner_map.pays(), b = b_.shape->lazy_inner_map.pays();
-    return a && b;
-  }
-
-  // Inner maps cost as much as some hundred contacts without them: they are made when there were as many, or
-  // for one that stays open otherwise.
+  // A bracket that stays open without the inner maps is worth them.
   ContactResult fallback(const PairFrame& pair, const JointSolution* known, const Vec3& seed,
                          double tolerance, int spent) {
-    return inner_maps_pay() ? bracket(pair, known, seed, tolerance, spent)
-                            : without_maps(pair, known, seed, tolerance, spent);
-  }
-  ContactResult without_maps(const PairFrame& pair, const JointSolution* known, const Vec3& seed,
-                             double tolerance, int spent) {
-    PairFrame plain = pair;
-    plain.inner_maps = false;
-    const ContactResult r = bracket(plain, known, seed, tolerance, spent);
-    const bool done = r.status != Status::unresolved;
-    if (done || (a_.shape->inner_map().nodes.empty() && b_.shape->inner_map().nodes.empty())) return r;
-    return bracket(pair, known, seed, tolerance, r.iterations);
+    const ContactResult r = bracket(pair, known, seed, tolerance, spent);
+    const LazyInnerMap &a = a_.shape->lazy_inner_map, &b = b_.shape->lazy_inner_map;
+    if (r.status != Status::unresolved || (a.made() && b.made())) return r;
+    const InnerMap &of_a = a_.shape->inner_map(), &of_b = b_.shape->inner_map();
+    return !of_a.nodes.empty() || !of_b.nodes.empty() ? bracket(pair, known, seed, tolerance, r.iterations)
+                                                      : r;
   }
 
   // The polytope brackets the global answer; a stationary point that lies inside its bracket is a better
@@ -327,7 +315,7 @@ class Ladder {
       spent += again.iterations;
       if (again.bracket.width() < hull.bracket.width()) hull = again;
     }
-    if (hull.converged && of_points(pair, tolerance))
+    if (hull.converged && (hull.closed || of_points(pair, tolerance)))
       return finish(pair, hull, hull.bracket.direction, Rung::fallback, spent);
     JointSolution joint;
     bool polished = false;

@@ -15,9 +15,10 @@ constexpr int kPairMemorySize = 54;
 // Newton from the last contact (0.25 us, 2 us next to a dent, 10 us over it), where that is on a face or two
 // creases along their known direction (1 us; flat_search.h); a cold start (2 us); the
 // search over directions of deep pairs (10 us); the polytope (70 us and more). A pair that touched last time
-// begins at the local model. Neither throws nor allocates, but for a shape's inner map, which is made when
-// some hundred of its overlaps, or one that stays open otherwise, ask for it (inner_map.h); always returns a
-// bracket. With the map a deep pair's bracket is another one of the same answer, within the tolerance.
+// begins at the local model. Neither throws nor allocates, but for a shape's inner map, which is made where a
+// bracket stays open without it (one deep pair in 5,000); always returns a bracket. Deep pairs of shapes
+// whose inner maps are there (Shape::inner_map(), asked for before) take a tenth to a half less time; their
+// bracket is another one of the same answer, within the tolerance.
 //
 // The overlap is the global minimum of p(d) over all directions, however deep. As such it changes by no more
 // than the bodies' relative translation, and under a turn by no more than the way of the outermost point:

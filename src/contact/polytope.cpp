@@ -5,12 +5,12 @@
 #include <cmath>
 
 #include "body/cube_map.h"
+#include "body/hull_point.h"
 #include "contact/cell_search.h"
 #include "contact/growing_hull.h"
 #include "contact/local_bend.h"
 #include "contact/ring_search.h"
 #include "contact/segment_search.h"
-#include "contact/support_turn.h"
 
 namespace nurbs {
 namespace {
@@ -20,7 +20,7 @@ struct Witness {
   Vec3 a, b;  // of the shrunk bodies
   Vec3 d;     // asked
   double p;   // upper bound of the overlap along it
-  SurfacePoint on_a, on_b;
+  HullPlace on_a, on_b;
   bool cap;  // no point of the obstacle: see Search::cover
 };
 
@@ -70,18 +70,21 @@ class Search {
  public:
   // `points`: of two sphero-polyhedra nothing else is left.
   Search(const PairFrame& pair, double tolerance, double joggle, bool points)
-      : pair_(pair), tolerance_(tolerance), joggle_(joggle), hull_(kSliver * pair.reach) {
-    if (PairFrame::is_swept(*pair.a, pair.scale_a, tolerance)) core_a_ = &pair.a->core;
-    if (PairFrame::is_swept(*pair.b, pair.scale_b, tolerance)) core_b_ = &pair.b->core;
-    if (core_a_) core_error_ += pair.scale_a * core_a_->error;
-    if (core_b_) core_error_ += pair.scale_b * core_b_->error;
+      : pair_(pair),
+        tolerance_(tolerance),
+        joggle_(joggle),
+        points_a_(hull_points(*pair.a, pair.scale_a, tolerance)),
+        points_b_(hull_points(*pair.b, pair.scale_b, tolerance)),
+        error_(pair.scale_a * points_a_.error() + pair.scale_b * points_b_.error()),
+        hull_(kSliver * pair.reach) {
     shrink_a_ = PairFrame::rolling_ball(*pair.a, pair.scale_a, tolerance);
     shrink_b_ = PairFrame::rolling_ball(*pair.b, pair.scale_b, tolerance);
-    points_ = points && core_a_ && core_b_;
+    points_ = points && PairFrame::is_swept(*pair.a, pair.scale_a, tolerance) &&
+              PairFrame::is_swept(*pair.b, pair.scale_b, tolerance);
     if (points_) {
       // The hull is their points' difference's, as exact as they are.
-      shrink_a_ = pair.scale_a * core_a_->radius;
-      shrink_b_ = pair.scale_b * core_b_->radius;
+      shrink_a_ = pair.scale_a * pair.a->core.radius;
+      shrink_b_ = pair.scale_b * pair.b->core.radius;
       shrink_ = shrink_a_ + shrink_b_;
       return;
     }
@@ -98,6 +101,9 @@ class Search {
         shrink_a_(shrink_a),
         shrink_b_(shrink_b),
         shrink_(shrink_a + shrink_b),
+        points_a_(whole.points_a_),
+        points_b_(whole.points_b_),
+        error_(whole.error_),
         valid_(valid),
         middle_(whole.witness_[from].d),
         hull_(kSliver * whole.pair_.reach) {
@@ -168,6 +174,7 @@ class Search {
     std::array<short, 3> asked = {-1, -1, -1};
     Vec3 asked_along = Vec3::Zero();
     for (int idle = 0; hull_.points() < most; ++idle) {
+      if (lower_caps_) lower_caps();
       const int near = best_face();
       if (near < 0 || upper_ - lower_ <= tolerance_ || lower_ > enough) return;
       if (upper_ - lower_ < last || near_ > near_before) idle = 0;
@@ -181,10 +188,6 @@ class Search {
       }
       asked = corners;
       asked_along = direction_to_ask_;
-      if (lower_caps_) {
-        lower_caps();
-        continue;
-      }
       const int v = query(direction_to_ask_, closest_of(hull_.face(near), direction_to_ask_));
       if (v < 0 || upper_ - lower_ <= tolerance_) return;
       if (hull_.grow(v, least_height(), near) != GrowingHull::Growth::grown) {
@@ -225,12 +228,8 @@ class Search {
     find_witness(&a, &b);
     r.points.a = a + shrink_a_ * direction_;
     r.points.b = b - shrink_b_ * direction_;
-    r.points.on_a = w.on_a;
-    r.points.on_b = w.on_b;
-    if (points_) {  // where to begin the next time, no more
-      r.points.on_a = find_hull_support(*pair_.a, direction_, nullptr, kFarAway).where;
-      r.points.on_b = find_hull_support(*pair_.b, pair_.direction_on_b(direction_), nullptr, kFarAway).where;
-    }
+    r.points.on_a = surface_place(*pair_.a, w.on_a, direction_);
+    r.points.on_b = surface_place(*pair_.b, w.on_b, pair_.direction_on_b(direction_));
     const double apart = direction_.dot(r.points.b - r.points.a);
     // Where the bracket stayed open, the least overlap seen: the hull errs to first order, the direction to
     // second.
@@ -242,7 +241,14 @@ class Search {
   }
 
  private:
-  double roundoff() const { return kRoundoff * pair_.reach + 2 * joggle_ + core_error_; }
+  static HullPoints hull_points(const Shape& shape, double scale, double tolerance) {
+    return HullPoints(shape, kSupportShare * tolerance / scale, kCoreError * tolerance / scale);
+  }
+  // On the patches: where to begin the next time, no more.
+  static SurfacePoint surface_place(const Shape& shape, const HullPlace& at, const Vec3& d) {
+    return at.on_surface.patch >= 0 ? at.on_surface : find_hull_support(shape, d, nullptr, kFarAway).where;
+  }
+  double roundoff() const { return kRoundoff * pair_.reach + 2 * joggle_ + error_; }
   // A point less high above a face than this is not worth adding: the bracket is as good as closed there.
   double least_height() const { return std::max(0.25 * roundoff(), kLeastHeight * tolerance_); }
 
@@ -251,37 +257,17 @@ class Search {
   int query(const Vec3& d, int near) {
     const int v = hull_.points();
     if (v == kHullVertices) return -1;
-    witness_[v].cap = false;
-    if (points_) return query_points(d, v);
-    const auto [sa, sb] = hull_supports(pair_, d, near < 0 ? nullptr : &witness_[near].on_a,
-                                        near < 0 ? nullptr : &witness_[near].on_b, tolerance_);
     Witness& w = witness_[v];
+    w.cap = false;
+    w.d = d;
+    const HullPoint a = points_a_.along(d, near < 0 ? nullptr : &witness_[near].on_a),
+                    b = points_b_.along(pair_.direction_on_b(d), near < 0 ? nullptr : &witness_[near].on_b);
     // The centres of balls that touch there from inside lie in the cores, exactly.
-    w.a = cored(core_a_, pair_.scale_a, sa, d, shrink_a_);
-    w.b = pair_.offset + pair_.turn * cored(core_b_, pair_.scale_b, sb, pair_.direction_on_b(d), shrink_b_);
-    w.d = d;
-    w.on_a = sa.where;
-    w.on_b = sb.where;
-    return take(v, pair_.overlap_along(d, sa.upper, sb.upper));
-  }
-
-  // Of a body in its own axes, lengths of the lab: where the core, less a ball of radius `shrink`, has its
-  // support along unit e. Of a sphero-polyhedron that does not rest on the surface's normal.
-  static Vec3 cored(const SpheroPolyhedron* core, double scale, const Support& on, const Vec3& e,
-                    double shrink) {
-    if (!core || shrink > scale * core->radius) return scale * on.point - shrink * on.normal;
-    return scale * core->points[core->support(e)] + (scale * core->radius - shrink) * e;
-  }
-
-  // The same of two sphero-polyhedra.
-  int query_points(const Vec3& d, int v) {
-    const Vec3 on_b = pair_.direction_on_b(d);
-    Witness& w = witness_[v];
-    w.a = pair_.place_a(core_a_->points[core_a_->support(d)]);
-    w.b = pair_.place_b(core_b_->points[core_b_->support(on_b)]);
-    w.d = d;
-    w.on_a.patch = w.on_b.patch = -1;
-    return take(v, d.dot(w.a - w.b) + shrink_ + core_error_);
+    w.a = pair_.place_a(a.point) - shrink_a_ * a.normal;
+    w.b = pair_.offset + pair_.turn * (pair_.scale_b * b.point - shrink_b_ * b.normal);
+    w.on_a = a.where;
+    w.on_b = b.where;
+    return take(v, pair_.overlap_along(d, a.upper, b.upper));
   }
 
   // A point whose witnesses are there, and the overlap p along its direction.
@@ -343,10 +329,9 @@ class Search {
     Mat2 wa, wb;
     const Witness& w = witness_[v];
     const Mat3 back = pair_.turn.transpose();
-    if (!support_turn(*pair_.a, w.on_a, d, w.d, t, s, pair_.scale_a, &wa)) return false;
-    if (!support_turn(*pair_.b, w.on_b, -(back * d), -(back * w.d), back * t, back * s, pair_.scale_b, &wb))
-      return false;
-    *turn = wa + wb - shrink_ * Mat2::Identity();
+    if (!points_a_.turn(w.on_a, d, w.d, t, s, &wa)) return false;
+    if (!points_b_.turn(w.on_b, -(back * d), -(back * w.d), back * t, back * s, &wb)) return false;
+    *turn = pair_.scale_a * wa + pair_.scale_b * wb - shrink_ * Mat2::Identity();
     return true;
   }
 
@@ -473,11 +458,11 @@ class Search {
   }
 
   // Of a body in its own axes, lengths of the lab.
-  Bend bend_of(const Shape& shape, const SurfacePoint& at, double scale, const Vec3& d, const Vec3& t,
+  Bend bend_of(const Shape& shape, const HullPlace& place, double scale, const Vec3& d, const Vec3& t,
                const Vec3& s) const {
     Bend bend;
     if (shape.dented() || shape.joint_slack > 0) return bend;
-    const InnerMap& map = pair_.inner_map(shape);
+    const InnerMap& map = shape.lazy_inner_map.known();
     if (!map.nodes.empty()) {
       const InnerNode& node = map.nodes[shape.atlas.nearest(d)];
       const double off = angle_between(node.normal, d);
@@ -492,6 +477,7 @@ class Search {
         bend.near[k] = kStretchCaps[k] - beside - kOffNormal;
       }
     }
+    const SurfacePoint at = surface_place(shape, place, d);
     JetLanes jet;
     evaluate2(shape.patches[at.patch], at.u, at.v, &jet);
     nurbs::scale(scale, &jet);
@@ -731,8 +717,8 @@ class Search {
   const PairFrame& pair_;
   double tolerance_, joggle_;
   double shrink_a_, shrink_b_, shrink_;
-  const SpheroPolyhedron *core_a_ = nullptr, *core_b_ = nullptr;  // that serve
-  double core_error_ = 0;
+  HullPoints points_a_, points_b_;
+  double error_;         // of their points
   bool points_ = false;  // are all that is left
   double valid_ = M_PI;  // what the cores hold for: directions within it of the middle
   Vec3 middle_ = Vec3::Zero();
@@ -764,7 +750,8 @@ PolytopeResult solve_polytope(const PairFrame& pair, const Vec3& seed, double to
   // its vertices moved at random by far more than round-off and far less than the tolerance (Barber, Dobkin &
   // Huhdanpaa 1996, section 4: joggled input); the upper bound allows for it.
   PolytopeResult best;
-  if (search_segments(pair, tolerance, &best)) return best;
+  if (search_segments(pair, tolerance, &best) || search_segment_in_ellipsoid(pair, seed, tolerance, &best))
+    return best;
   Vec3 from = seed;
   bool points = true;
   for (int attempt = 0; attempt < kHullAttempts; ++attempt) {
@@ -778,7 +765,8 @@ PolytopeResult solve_polytope(const PairFrame& pair, const Vec3& seed, double to
       continue;
     }
     if (started && attempt == 0 && (pair.a->revolution.found || pair.b->revolution.found)) {
-      const bool bent = !pair.inner_map(*pair.a).nodes.empty() && !pair.inner_map(*pair.b).nodes.empty();
+      const bool bent =
+          !pair.a->lazy_inner_map.known().nodes.empty() && !pair.b->lazy_inner_map.known().nodes.empty();
       search.run(enough, bent ? kBentBeforeRings : kBeforeRings);
       best = search.result();
       if (!best.converged && is_polar(pair, best.bracket.direction)) {

@@ -8,11 +8,12 @@
 namespace nurbs {
 
 struct PolytopeResult {
-  PointPair points;  // witness points; normals are set to the search direction
-  Bracket bracket;   // certified, of the gap, over ALL directions
-  double gap;        // direction . (b - a), inside the bracket
-  int iterations;    // support pairs evaluated
-  bool converged;    // bracket no wider than the tolerance
+  PointPair points;     // witness points; normals are set to the search direction
+  Bracket bracket;      // certified, of the gap, over ALL directions
+  double gap;           // direction . (b - a), inside the bracket
+  int iterations;       // support pairs evaluated
+  bool converged;       // bracket no wider than the tolerance
+  bool closed = false;  // in closed form: points and direction want no polish
 };
 
 // Moves the points along the normal, half each, until they are the gap apart.

@@ -402,7 +402,7 @@ class RingSearch {
   // directions within `reach` of e in their plane, or, `any`, of any tangent and all directions within reach.
   // 0 where nothing is known.
   double least_bend(const Shape& shape, const Vec3& e, const Vec3& v, double reach, bool any) const {
-    const InnerMap& map = pair_.inner_map(shape);
+    const InnerMap& map = shape.lazy_inner_map.known();
     if (map.stretches.empty()) return 0;
     const int cell = InnerMap::cell(e);
     const double off = (e - InnerMap::middle(cell)).norm();
@@ -420,7 +420,8 @@ class RingSearch {
   // The same along the meridian of a body of revolution, `axis` its own, or of a ball, any axis.
   double meridian_bend(const Shape& shape, const Vec3& e, const Vec3& axis, double reach) const {
     const double cosine = e.dot(axis), sine = e.cross(axis).norm();
-    const double radius = shape.proofs.sphere ? 0 : shape.profile_radii.within(cosine, sine, kChord * reach);
+    const double radius =
+        shape.proofs.sphere ? 0 : shape.profile_radii.within(cosine, sine, kChord * reach).radius;
     if (!(sine > kNoDirection)) return radius;
     return std::max(radius, least_bend(shape, e, (axis - cosine * e) / sine, reach, false));
   }

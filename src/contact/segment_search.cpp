@@ -1,13 +1,17 @@
-// Nearest points of two segments (Ericson 2005, section 5.1.9); see segment_search.h.
+// Nearest points of two segments (Ericson 2005, section 5.1.9), least overlap of a segment and an ellipsoid;
+// see segment_search.h.
 #include "contact/segment_search.h"
 
 #include <algorithm>
 #include <cmath>
 
+#include "contact/ellipsoid_overlap.h"
+
 namespace nurbs {
 namespace {
 
-constexpr double kParallel = 1e-20;  // squared sine, below which segments are
+constexpr double kParallel = 1e-20;   // squared sine, below which segments are
+constexpr double kLevelShare = 0.25;  // of the tolerance: a segment's points as near as that are level
 
 // A point, if `half` is 0.
 struct Segment {
@@ -78,6 +82,54 @@ bool search_segments(const PairFrame& pair, double tolerance, PolytopeResult* re
   r.points.on_a = find_hull_support(*pair.a, normal).where;
   r.points.on_b = find_hull_support(*pair.b, pair.direction_on_b(normal)).where;
   return true;
+}
+
+bool search_segment_in_ellipsoid(const PairFrame& pair, const Vec3& seed, double tolerance,
+                                 PolytopeResult* result) {
+  // The ellipsoid stays where it is; everything is symmetric about the middles.
+  const bool first = pair.a->ellipsoid.found;
+  const Shape &round = first ? *pair.a : *pair.b, &swept = first ? *pair.b : *pair.a;
+  const double scale = first ? pair.scale_a : pair.scale_b, scale_swept = first ? pair.scale_b : pair.scale_a;
+  const double error = scale * round.ellipsoid.error * round.bounding_radius;
+  if (!(round.ellipsoid.found && error <= kCoreError * tolerance) || swept.core.points.size() > 2 ||
+      !PairFrame::is_swept(swept, scale_swept, tolerance))
+    return false;
+  const Mat3 turn = first ? Mat3::Identity() : pair.turn;
+  const Vec3 center = first ? Vec3(Vec3::Zero()) : pair.offset;
+  const Segment segment = first ? segment_of(swept.core, scale_swept, pair.turn, pair.offset)
+                                : segment_of(swept.core, scale_swept, Mat3::Identity(), Vec3::Zero());
+  const double length = segment.half.norm();
+  SweptEllipsoid a{scale * (turn * round.ellipsoid.root * turn.transpose()), scale * round.ellipsoid.least(),
+                   scale * round.ellipsoid.semi.maxCoeff(), 0},
+      b{Mat3::Zero(), 0, length, scale_swept * swept.core.radius};
+  if (length > 0) b.root = segment.half * segment.half.transpose() / length;
+  const Vec3 start =
+      seed.squaredNorm() > 0 ? Vec3((first ? 1 : -1) * seed.normalized()) : Vec3(Vec3::UnitX());
+  LeastOverlap least;
+  if (!find_least_overlap(a, b, segment.middle - center, start, 0.5 * tolerance, &least)) return false;
+  const Vec3& d = least.direction;  // from the ellipsoid
+  const Vec3 on_round = center + a.point(d);
+  // The end nearer to the ellipsoid, or any point that is as near to little of the tolerance.
+  double t = segment.nearest(on_round);
+  const double towards = d.dot(segment.half);
+  if (std::abs(towards) + t * towards > kLevelShare * tolerance) t = towards > 0 ? -1 : 1;
+  const Vec3 on_swept = segment.at(t) - b.ball * d;
+  const double noise = error + scale_swept * swept.core.error + 4 * kRoundoff * pair.reach;
+  PolytopeResult& r = *result;
+  r.bracket.direction = first ? d : Vec3(-d);
+  r.bracket.lower = -least.overlap - noise;
+  r.bracket.upper = -least.level + noise;
+  r.converged = r.closed = r.bracket.width() <= tolerance;
+  r.iterations = least.tests;
+  r.gap = -least.overlap;
+  r.points.na = r.bracket.direction;
+  r.points.nb = -r.points.na;
+  r.points.a = first ? on_round : on_swept;
+  r.points.b = first ? on_swept : on_round;
+  part_points(&r);
+  r.points.on_a = find_hull_support(*pair.a, r.points.na).where;
+  r.points.on_b = find_hull_support(*pair.b, pair.direction_on_b(r.points.na)).where;
+  return r.converged;
 }
 
 }  // namespace nurbs

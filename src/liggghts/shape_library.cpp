@@ -22,6 +22,8 @@ namespace LAMMPS_NS {
 
 namespace {
 
+constexpr int kMostMapped = 32;  // shapes that get inner maps: of more, each has few deep contacts
+
 // Appends / takes a length-prefixed string; `take` returns false at the end of a damaged `data`.
 void append(std::string& data, const std::string& item) {
   const std::uint64_t size = item.size();
@@ -108,7 +110,7 @@ std::vector<int> ShapeLibrary::deal(const std::vector<std::size_t>& first) const
 
 // This rank's share, on the cores that the ranks of its machine leave it: a thread takes the next file until
 // none is left. What comes out does not depend on who made it.
-std::vector<ShapeLibrary::Made> ShapeLibrary::make(const std::vector<std::size_t>& mine) const {
+std::vector<ShapeLibrary::Made> ShapeLibrary::make(const std::vector<std::size_t>& mine, bool mapped) const {
   std::vector<Made> made(sources_.size());
   std::atomic<std::size_t> next{0};
   const auto work = [&] {
@@ -118,6 +120,7 @@ std::vector<ShapeLibrary::Made> ShapeLibrary::make(const std::vector<std::size_t
         auto content = nurbs::parse_shape(sources_[k].text, sources_[k].file);
         made[k].shape = nurbs::make_shape(sources_[k].name, std::move(content.surfaces), content.gyration,
                                           &made[k].warnings);
+        if (mapped) made[k].shape->inner_map();
       } catch (const nurbs::ShapeError& error) {
         made[k].failure = error.what();
       }
@@ -162,9 +165,12 @@ void ShapeLibrary::build() {
   const std::vector<std::size_t> first = first_of_content();
   const std::vector<int> maker = deal(first);
   std::vector<std::size_t> mine;
-  for (std::size_t k = 0; k < maker.size(); ++k)
+  int distinct = 0;
+  for (std::size_t k = 0; k < maker.size(); ++k) {
+    distinct += maker[k] >= 0;
     if (maker[k] == comm->me) mine.push_back(k);
-  std::vector<Made> made = make(mine);
+  }
+  std::vector<Made> made = make(mine, distinct <= kMostMapped);
   for (std::size_t k = 0; k < sources_.size(); ++k) {
     Source& source = sources_[k];
     if (!numbers_.emplace(source.name, static_cast<int>(k + 1)).second)

@@ -58,7 +58,7 @@ class ShapeLibrary : protected Pointers {
   };
   std::vector<std::size_t> first_of_content() const;
   std::vector<int> deal(const std::vector<std::size_t>& first) const;
-  std::vector<Made> make(const std::vector<std::size_t>& mine) const;
+  std::vector<Made> make(const std::vector<std::size_t>& mine, bool mapped) const;
   void pass_on(int maker, Made& made) const;
   void build();
 

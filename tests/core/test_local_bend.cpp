@@ -5,8 +5,8 @@
 #include <cmath>
 #include <vector>
 
+#include "body/support_turn.h"
 #include "contact/local_bend.h"
-#include "contact/support_turn.h"
 #include "shapes/random_pebble.h"
 #include "shapes/revolved.h"
 #include "support/bodies.h"

@@ -71,11 +71,21 @@ TEST(ShapeArchive, ContactsOfACopyAreThoseOfTheShape) {
   }
 }
 
-TEST(ShapeArchive, InnerMapIsMadeAgainTheSame) {
+TEST(ShapeArchive, InnerMapGoesAlongIfThereIsOne) {
   const auto shape = test::smooth_pebble();
-  const InnerMap &map = shape->inner_map(), &again = unpack(pack(*shape))->inner_map();
+  const InnerMap& map = shape->inner_map();
+  const auto copy = unpack(pack(*shape));
+  ASSERT_TRUE(copy->lazy_inner_map.made());
+  const InnerMap& again = copy->lazy_inner_map.known();
   ASSERT_EQ(map.nodes.size(), again.nodes.size());
-  for (size_t k = 0; k < map.nodes.size(); ++k) EXPECT_EQ(map.nodes[k].radius, again.nodes[k].radius);
+  ASSERT_EQ(map.stretches.size(), again.stretches.size());
+  for (size_t k = 0; k < map.nodes.size(); ++k) {
+    EXPECT_EQ(map.nodes[k].radius, again.nodes[k].radius);
+    EXPECT_EQ(map.nodes[k].point, again.nodes[k].point);
+  }
+  for (size_t k = 0; k < map.stretches.size(); ++k) EXPECT_EQ(map.stretches[k].most, again.stretches[k].most);
+  const auto without = make_shape("without", pebble());
+  EXPECT_FALSE(unpack(pack(*without))->lazy_inner_map.made());
 }
 
 TEST(ShapeArchive, DamagedBytesAreRefused) {

@@ -1,5 +1,5 @@
 // The map of support points, and which parameters an edge holds; see support_turn.h.
-#include "contact/support_turn.h"
+#include "body/support_turn.h"
 
 #include "nurbs/tolerances.h"
 
