@@ -40,6 +40,14 @@ HullPoint HullPoints::along(const Vec3& d, const HullPlace* start) const {
   return on_patches(d, start);
 }
 
+HullPoint HullPoints::near(const Vec3& d) const {
+  if (form_ != Form::patches) return along(d);
+  const DirectionAtlas& atlas = shape_.atlas;
+  const int node = atlas.nearest(d);
+  return {
+      atlas.point[node], atlas.direction(node).normalized(), atlas.support_upper(d), {{}, atlas.where[node]}};
+}
+
 HullPoint HullPoints::on_ellipsoid(const Vec3& d) const {
   const Vec3 k = shape_.ellipsoid.root * d;
   const double h = k.norm();

@@ -31,6 +31,9 @@ class HullPoints {
   // Of the hull's support along unit d. 20 ns of ellipsoids and sphero-polyhedra that serve, 0.1 us by a
   // meridian, else find_hull_support. `start` may be null.
   HullPoint along(const Vec3& d, const HullPlace* start = nullptr) const;
+  // The same of a direction near d, as far as that spares a search, with an upper bound along d that is a
+  // little loose: for a first solid. 20 ns.
+  HullPoint near(const Vec3& d) const;
   // d(point)/d(direction) in the tangent plane of d spanned by t and s, of a point found along `asked`, which
   // is near d: what the support function bends by. Zero at corners, of rank 1 on edges. False where there is
   // none: on faces and lines, and along the axis of what turns about it.

@@ -84,10 +84,15 @@ void GrowingHull::set(int f, int a, int b, int c) {
   face.sliver = !(area2 > sliver_ * sliver_ * base2);
   face.normal = face.sliver ? Vec3(Vec3::Zero()) : Vec3(m / std::sqrt(area2));
   face.offset = std::min({face.normal.dot(p), face.normal.dot(q), face.normal.dot(r)});
-  // With the plane's own foot where it lies inside, which is exact to round-off however far the corners are.
-  face.weights = nearest_on_triangle(p, q, r);
-  face.distance2 = count_positive(face.weights) == 3 && !face.sliver ? face.offset * face.offset
-                                                                     : nearest_point(face).squaredNorm();
+  face.foot = false;
+  face.distance2 = face.offset * face.offset;
+}
+
+// The plane's own foot where it lies inside, which is exact to round-off however far the corners are.
+void GrowingHull::find_foot(Face* f) const {
+  f->foot = true;
+  f->weights = nearest_on_triangle(point_[f->vertex[0]], point_[f->vertex[1]], point_[f->vertex[2]]);
+  if (count_positive(f->weights) < 3 || f->sliver) f->distance2 = nearest_point(*f).squaredNorm();
 }
 
 bool GrowingHull::start(int a, int b, int c, int d) {
@@ -213,14 +218,18 @@ GrowingHull::Growth GrowingHull::add(int point, int first, double level) {
   return Growth::broken;
 }
 
-GrowingHull::Nearest GrowingHull::nearest() const {
+GrowingHull::Nearest GrowingHull::nearest() {
   Nearest best{-1, kFarAway, true};
   int corners = 0;
   for (int k = 0; k < faces_; ++k) {
-    const Face& f = face_[k];
+    Face& f = face_[k];
     if (!f.alive) continue;
     if (!f.sliver && f.offset < 0) best.inside = false;
     if (f.distance2 > best.distance2 * (1 + kTie)) continue;
+    if (!f.foot) {
+      find_foot(&f);
+      if (f.distance2 > best.distance2 * (1 + kTie)) continue;
+    }
     const int on = count_positive(f.weights);
     if (f.distance2 < best.distance2 * (1 - kTie) || on > corners) {
       best.face = k;

@@ -25,6 +25,7 @@ class GrowingHull {
     bool sliver;       // lower than `sliver_height`: normal and offset mean nothing
     Vec3 normal;       // unit
     double offset;     // normal . vertex: signed distance of its plane from the origin
+    bool foot;         // weights are known; until then distance2 is the plane's, which is no more
     Vec3 weights;      // of its point nearest to the origin
     double distance2;  // ... and how far that is, squared
   };
@@ -65,7 +66,7 @@ class GrowingHull {
     double distance2;
     bool inside;
   };
-  Nearest nearest() const;
+  Nearest nearest();
 
   // Whether every edge joins two living triangles that agree on it (for tests).
   bool closed() const;
@@ -76,6 +77,7 @@ class GrowingHull {
     short outside, slot;  // the face that stays, and which of its edges this is
   };
   void set(int f, int a, int b, int c);
+  void find_foot(Face* f) const;
   int highest_seen_from(const Vec3& p, double* height) const;
   bool find_visible(const Vec3& p, int first, double threshold);
   bool chain_horizon();

@@ -53,7 +53,8 @@ constexpr double kFlatBend = 1e-3;        // of the overlap, of its bend along a
 constexpr double kCapDepth = 0.4;         // of the tolerance, that a cap proves less than the least overlap
 constexpr double kCapUsed = 0.8;          // of a cap's angle: the rest is for lower minima found later
 constexpr double kWidestCap = 0.42, kLeastCap = 1e-4, kNextCap = 0.75;  // rad
-constexpr double kOffNormal = 1e-6;                                     // rad, given away for round-off
+constexpr double kPlaneBeyond = 4;   // times the least distance, squared: no triangle in it is nearer
+constexpr double kOffNormal = 1e-6;  // rad, given away for round-off
 // A cap whose bodies are cut to their cores about it, below.
 constexpr double kOffSupport = 1e-4;  // rad
 constexpr int kBeforeCores = 96;      // points before that is tried ...
@@ -154,8 +155,10 @@ class Search {
     const Vec3 d = seed.squaredNorm() > 0 ? Vec3(seed.normalized()) : Vec3(Vec3::UnitX());
     const Vec3 t = d.unitOrthogonal(), s = d.cross(t);
     query(d, -1);
-    for (const double angle : {0.0, 2.0943951023931953, 4.1887902047863905})
-      query(-d / 3 + 0.9428090415820634 * (std::cos(angle) * t + std::sin(angle) * s), -1);
+    for (const double angle : {0.0, 2.0943951023931953, 4.1887902047863905}) {
+      const Vec3 beside = -d / 3 + 0.9428090415820634 * (std::cos(angle) * t + std::sin(angle) * s);
+      take(beside, points_a_.near(beside), points_b_.near(pair_.direction_on_b(beside)));
+    }
     for (int round = 0; round < kFlatRounds; ++round) {
       Vec3 across;
       // Points alone may be flat, and no hull of theirs any bound: balls are left on them then.
@@ -214,13 +217,19 @@ class Search {
   // Whether round-off ended the search, so that other directions may do better.
   bool stalled() const { return stalled_; }
 
-  PolytopeResult result() const {
+  // What is known so far, without the contact points.
+  PolytopeResult bracket() const {
     PolytopeResult r;
     r.iterations = queries_;
     r.bracket.lower = lower_;
     r.bracket.upper = std::max(upper_, lower_);
     r.converged = upper_ - lower_ <= tolerance_;
     r.bracket.direction = direction_;
+    return r;
+  }
+
+  PolytopeResult result() const {
+    PolytopeResult r = bracket();
     r.points.na = direction_;
     r.points.nb = -direction_;
     const Witness& w = witness_[best_];
@@ -255,26 +264,24 @@ class Search {
   // Support pair along unit d as a new point; tightens the lower bound of the gap. `near`: a point whose
   // supports are worth starting from, or -1.
   int query(const Vec3& d, int near) {
+    if (hull_.points() == kHullVertices) return -1;
+    const HullPoint a = points_a_.along(d, near < 0 ? nullptr : &witness_[near].on_a),
+                    b = points_b_.along(pair_.direction_on_b(d), near < 0 ? nullptr : &witness_[near].on_b);
+    return take(d, a, b);
+  }
+
+  // The points of both bodies as the hull's next; not when it is full.
+  int take(const Vec3& d, const HullPoint& a, const HullPoint& b) {
     const int v = hull_.points();
-    if (v == kHullVertices) return -1;
     Witness& w = witness_[v];
     w.cap = false;
     w.d = d;
-    const HullPoint a = points_a_.along(d, near < 0 ? nullptr : &witness_[near].on_a),
-                    b = points_b_.along(pair_.direction_on_b(d), near < 0 ? nullptr : &witness_[near].on_b);
     // The centres of balls that touch there from inside lie in the cores, exactly.
     w.a = pair_.place_a(a.point) - shrink_a_ * a.normal;
     w.b = pair_.offset + pair_.turn * (pair_.scale_b * b.point - shrink_b_ * b.normal);
     w.on_a = a.where;
     w.on_b = b.where;
-    return take(v, pair_.overlap_along(d, a.upper, b.upper));
-  }
-
-  // A point whose witnesses are there, and the overlap p along its direction.
-  int take(int v, double p) {
-    Witness& w = witness_[v];
-    const Vec3& d = w.d;
-    w.p = p;
+    const double p = w.p = pair_.overlap_along(d, a.upper, b.upper);
     Vec3 g = w.a - w.b;
     if (joggle_ > 0) g += joggle_ * scatter(g);
     hull_.store(g);
@@ -701,6 +708,8 @@ class Search {
     for (int k = 0; k < hull_.faces(); ++k) {
       const GrowingHull::Face& f = hull_.face(k);
       if (!f.alive) continue;
+      const double above = f.normal.dot(target) - f.offset;  // 0 of slivers
+      if (above * above > kPlaneBeyond * best) continue;
       const Vec3 &p = hull_.point(f.vertex[0]), &q = hull_.point(f.vertex[1]), &r = hull_.point(f.vertex[2]);
       const Vec3 w = nearest_on_triangle(p - target, q - target, r - target);
       const double distance = (w[0] * p + w[1] * q + w[2] * r - target).squaredNorm();
@@ -768,10 +777,10 @@ PolytopeResult solve_polytope(const PairFrame& pair, const Vec3& seed, double to
       const bool bent =
           !pair.a->lazy_inner_map.known().nodes.empty() && !pair.b->lazy_inner_map.known().nodes.empty();
       search.run(enough, bent ? kBentBeforeRings : kBeforeRings);
-      best = search.result();
+      best = search.bracket();
       if (!best.converged && is_polar(pair, best.bracket.direction)) {
         search.run(enough, kAtPoles);
-        best = search.result();
+        best = search.bracket();
       }
       if (!best.converged && search_rings(pair, tolerance, false, &best)) return best;
     }
