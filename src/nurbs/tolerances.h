@@ -235,8 +235,8 @@ constexpr double kRingNormals = 0.011;  // between normals looked up: half of it
                                         // kNormalMargin
 
 // --- polytope method
-constexpr int kHullVertices = 768;      // support pairs a fallback may spend; 20 to 80 are usual
-constexpr int kHullFaces = 3072;        // twice the vertices, and room for those being replaced
+constexpr int kHullVertices = 1152;     // support pairs a fallback may spend; 20 to 80 are usual
+constexpr int kHullFaces = 4608;        // twice the vertices, and room for those being replaced
 constexpr int kHullAttempts = 6;        // from other directions, when round-off stalled the hull
 constexpr double kHullTurn = 0.2;       // between them
 constexpr double kCoreShare = 0.5;      // of the smaller of the bodies' least curvature radii taken off, the

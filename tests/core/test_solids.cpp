@@ -359,6 +359,12 @@ TEST(SavedCases, fits_about_one_centre) {
   expect_resolved({{"centred-fits.json", -3.28900085205}, {"centred-fit-spheroid.json", -1.99066209761}});
 }
 
+// Left unresolved by three times the tolerance: a cylinder about such a fit, whose hull wanted 900 points for
+// 768.
+TEST(SavedCases, a_cylinder_about_a_fit) {
+  expect_resolved({{"cylinder-about-fit.json", -0.3331919602}});
+}
+
 // Left unresolved, by a hundredth of the overlap: rings about the minimum, on a small kink, broke the hull.
 TEST(SavedCases, a_small_tablet_deep_in_a_fit) {
   expect_resolved({{"small-tablet-in-fit.json", -0.412201044432}});
