@@ -21,7 +21,8 @@ struct PairCase {
 bool write_pair_case(const std::string& file, const Particle& a, const Particle& b,
                      const ContactSettings& settings);
 
-// Without the shapes' inner maps: after Shape::inner_map() of both the bits are those of a run. Throws ShapeError naming the file and what is wrong with it.
+// Without the shapes' inner maps: after Shape::inner_map() of both the bits are those of a run. Throws
+// ShapeError naming the file and what is wrong with it.
 PairCase read_pair_case(const std::string& file);
 
 }  // namespace nurbs
