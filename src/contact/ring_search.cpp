@@ -7,12 +7,14 @@
 namespace nurbs {
 namespace {
 
-constexpr int kMostCircles = 256;       // supports evaluated, one as dear as ...
-constexpr int kCircleCost = 4;          // ... sectors
-constexpr int kMostSpent = 2400;        // sectors bounded, some 0.3 us each, and circles
-constexpr int kFirstSpent = 900;        // ... and those after which it ends ...
-constexpr double kHopeless = 0.1;       // ... where less than this times its share of all is closed
-constexpr int kDeepestSector = 60;      // halvings of the azimuth
+constexpr int kMostCircles = 256;            // supports evaluated, one as dear as ...
+constexpr int kCircleCost = 4;               // ... sectors
+constexpr double kMostSpent = 2400;          // sectors bounded, some 0.3 us each, and circles
+constexpr double kMostCompared = 1e6;        // circles in their hulls, 2 ns each
+constexpr double kMostComparedLast = 1.5e7;  // ... where nothing else did
+constexpr double kFirstSpent = 0.375;        // of either, after which it ends ...
+constexpr double kHopeless = 0.1;            // ... where less than this times its share of all is closed
+constexpr int kDeepestSector = 60;           // halvings of the azimuth
 constexpr double kNearAxis = 0.2;       // sine between the axes up to which both bodies' circles are used
 constexpr double kNearlyAlike = 0.1;    // of the body's radius: what directions of a ring may differ by ...
 constexpr double kHardlyAlike = 0.4;    // ... where nothing else did
@@ -104,6 +106,7 @@ struct Least {
   Angle at;
   int from, to;     // circles level there, equal at an end of the range
   Angle low, high;  // all that is below the threshold lies between
+  int corners;      // of the polygon that were passed
 };
 
 double square(double x) {
@@ -140,7 +143,7 @@ Least least_of_greatest(const Meridian* p, int count, Angle low, Angle high, dou
   int top = 0;
   for (int i = 1; i < count; ++i)
     if (height(i, low) > height(top, low)) top = i;
-  Least least{height(top, low), low, top, top, low, high};
+  Least least{height(top, low), low, top, top, low, high, 1};
   bool some = least.value < threshold, open = some;
   Angle now = low;
   for (int over = -1; over != top;) {
@@ -161,10 +164,11 @@ Least least_of_greatest(const Meridian* p, int count, Angle low, Angle high, dou
       }
       over = j;
     }
-    const double length = std::hypot(next.c, next.s);
+    ++least.corners;
+    const double length = std::sqrt(square(next.c) + square(next.s));
     next = {next.c / length, next.s / length};
     const double h = height(top, next);
-    if (h < least.value) least = {h, next, top, over, least.low, least.high};
+    if (h < least.value) least = {h, next, top, over, least.low, least.high, least.corners};
     if (h < threshold) {
       if (!some) least.low = level_at(now, next, height(top, now), h, threshold);
       some = open = true;
@@ -204,13 +208,13 @@ class RingSearch {
     on_k_ = last_k_;
     on_m_ = last_m_;
     const double alike = differ() / (view_.scale_k * view_.k->bounding_radius);
-    if (!(last ? alike >= kNearlyAlike && alike < kHardlyAlike : alike < kNearlyAlike)) return false;
+    if (!(alike < (last ? kHardlyAlike : kNearlyAlike))) return false;
     const double phi = azimuth(e);
     for (int k = 0; k < kFirstAngles; ++k) {
       const double angle = M_PI * k / (kFirstAngles - 1);
       query(direction({std::cos(angle), std::sin(angle)}, phi));
     }
-    if (!close(phi)) return false;
+    if (!close(phi, last ? kMostComparedLast : kMostCompared)) return false;
     fill(result);
     return true;
   }
@@ -395,6 +399,7 @@ class RingSearch {
     Least least = least_of_greatest(meridian_, chosen_, sector.low, sector.high, threshold + turned + noise_,
                                     4 * kRoundoff * pair_.reach);
     least.value -= turned + noise_;
+    compared_ += static_cast<long>(least.corners) * chosen_;
     return least;
   }
 
@@ -541,16 +546,16 @@ class RingSearch {
     return round + least - lost - noise_;
   }
 
-  bool close(double phi) {
+  bool close(double phi, double most_compared) {
     Sector stack[kDeepestSector + 2];
     int top = 0, sectors = 0;
     double closed = 0;
     stack[top++] = {phi, M_PI, {1, 0}, {-1, 0}, 1};
     proven_ = kFarAway;
     while (top > 0) {
-      const int spent = ++sectors + kCircleCost * count_;
-      if (spent > kMostSpent || (spent > kFirstSpent && closed < kHopeless * spent / kMostSpent))
-        return false;
+      const double spent =
+          std::max((++sectors + kCircleCost * count_) / kMostSpent, compared_ / most_compared);
+      if (spent > 1 || (spent > kFirstSpent && closed < kHopeless * spent)) return false;
       Sector& sector = stack[top - 1];
       const double threshold = best_ - kClosedShare * tolerance_;
       const Least wide = bound(sector, sector.half, threshold);
@@ -637,6 +642,7 @@ class RingSearch {
   Vec3 best_e_ = Vec3::UnitX();
   SurfacePoint on_k_, on_m_, last_k_, last_m_;
   int count_ = 0, queries_ = 0;
+  long compared_ = 0;  // circles, in plane hulls
   Circle circle_[kMostCircles];
   int chosen_ = 0, which_[kMostCircles];
   Meridian meridian_[kMostCircles];  // of the chosen
