@@ -7,15 +7,15 @@
 namespace nurbs {
 namespace {
 
-constexpr int kMostCircles = 256;            // supports evaluated, one as dear as ...
-constexpr int kCircleCost = 4;               // ... sectors
-constexpr double kMostSpent = 2400;          // sectors bounded, some 0.3 us each, and circles
-constexpr double kMostCompared = 1e6;        // circles in their hulls, 2 ns each
-constexpr double kMostComparedLast = 1.5e7;  // ... where nothing else did
-constexpr double kFirstSpent = 0.375;        // of either, after which it ends ...
-constexpr double kHopeless = 0.1;            // ... where less than this times its share of all is closed
-constexpr int kDeepestSector = 60;           // halvings of the azimuth
-constexpr double kNearAxis = 0.2;       // sine between the axes up to which both bodies' circles are used
+constexpr int kMostCircles = 256;          // supports evaluated, one as dear as ...
+constexpr int kCircleCost = 4;             // ... sectors
+constexpr double kMostSpent = 2400;        // sectors bounded, some 0.3 us each, and circles
+constexpr double kMostCompared = 1e6;      // circles in their hulls, 2 ns each
+constexpr double kMostComparedLast = 4e6;  // ... where nothing else did
+constexpr double kFirstSpent = 0.375;      // of either, after which it ends ...
+constexpr double kHopeless = 0.1;          // ... where less than this times its share of all is closed
+constexpr int kDeepestSector = 60;         // halvings of the azimuth
+constexpr double kNearAxis = 0.2;          // sine between the axes up to which both bodies' circles are used
 constexpr double kNearlyAlike = 0.1;    // of the body's radius: what directions of a ring may differ by ...
 constexpr double kHardlyAlike = 0.4;    // ... where nothing else did
 constexpr double kClosedShare = 0.9;    // of the tolerance at which a sector is closed ...
