@@ -51,22 +51,6 @@ std::vector<float> tree_of(const std::vector<float>& cells) {
   return tree;
 }
 
-// From the axis; 0 where round-off leaves the support open.
-std::vector<float> distances(const Meridian& m, double size) {
-  std::vector<float> least(kProfileCells);
-  float before = 0;
-  for (int k = 0; k <= kProfileCells; ++k) {
-    const double at = 2.0 * k / kProfileCells - 1, dr = 1 - std::abs(at), length = std::hypot(dr, at);
-    ProfilePoint p;
-    const bool found = find_profile_point(m, dr / length, at / length, size, {}, &p);
-    const float here =
-        found && p.r > 0 ? std::nextafter(static_cast<float>(p.r * (1 - kBesideCell)), 0.0F) : 0.0F;
-    if (k > 0) least[k - 1] = std::min(before, here);
-    before = here;
-  }
-  return least;
-}
-
 double largest(const Row& row) {
   double most = 0;
   for (const double x : row) most = std::max(most, std::abs(x));
@@ -219,23 +203,19 @@ class Painter {
 
 }  // namespace
 
-ProfileRadii::Bounds ProfileRadii::within(double cosine, double sine, double reach) const {
-  if (least.empty() || !(reach < kWidestReach)) return {0, 0};
+double ProfileRadii::within(double cosine, double sine, double reach) const {
+  if (least.empty() || !(reach < kWidestReach)) return 0;
   const double c = std::cos(reach), s = std::sin(reach);
   const Vec2 low(sine * c - cosine * s, cosine * c + sine * s),
       high(sine * c + cosine * s, cosine * c - sine * s);
   const Cells cells = cells_of(place_of(low), place_of(high));
-  float radius = least[kProfileCells + cells.first], distance = around[kProfileCells + cells.first];
+  float radius = least[kProfileCells + cells.first];
   int from = cells.first + kProfileCells, to = cells.last + kProfileCells + 1;
-  const auto take = [&](int node) {
-    radius = std::min(radius, least[node]);
-    distance = std::min(distance, around[node]);
-  };
   for (; from < to; from /= 2, to /= 2) {
-    if (from % 2 == 1) take(from++);
-    if (to % 2 == 1) take(--to);
+    if (from % 2 == 1) radius = std::min(radius, least[from++]);
+    if (to % 2 == 1) radius = std::min(radius, least[--to]);
   }
-  return {radius, distance};
+  return radius;
 }
 
 ProfileRadii make_profile_radii(const Meridian& m, const std::vector<BezierPatch>& patches, double size) {
@@ -244,7 +224,7 @@ ProfileRadii make_profile_radii(const Meridian& m, const std::vector<BezierPatch
   for (const Meridian::Piece& piece : m.pieces)
     if (!painter.paint(piece, profile_turn(m, piece, patches, size))) return {};
   if (!painter.paint_kinks()) return {};
-  return {tree_of(painter.radii()), tree_of(distances(m, size))};
+  return {tree_of(painter.radii())};
 }
 
 }  // namespace nurbs

@@ -11,22 +11,18 @@ namespace nurbs {
 // With H(alpha) the support function of a profile in its half plane, alpha the angle from the axis,
 //     H'' + H >= the cell's value   (as a measure: a line, or a bridged dent, adds to it)
 // for all alpha of a cell. Radii are those of all points that have their normals there, proven from Bernstein
-// coefficients; cells that kinks of more than kProfileKink reach into have 0. And the distance from the axis
-// of the support points, which grows towards alpha = pi / 2, so that a cell has it from its ends.
+// coefficients; cells that kinks of more than kProfileKink reach into have 0.
 struct ProfileRadii {
-  // Of kProfileCells cells, over the angle; trees of minima, leaves last. Empty: nothing is known.
-  std::vector<float> least, around;
+  // Lengths, of kProfileCells cells over the angle: a tree of minima, leaves last. Empty: nothing is known.
+  std::vector<float> least;
 
-  struct Bounds {
-    double radius, around;  // lengths
-  };
   // For all angles within `reach` (rad) of the one of this cosine and sine; 0 where nothing is known.
-  Bounds within(double cosine, double sine, double reach) const;
+  double within(double cosine, double sine, double reach) const;
 };
 template <class Archive>
 void archive(Archive& a, ProfileRadii& s) {
-  auto& [least, around] = s;
-  a(least, around);
+  auto& [least] = s;
+  a(least);
 }
 
 // Of an empty meridian empty. `patches` say which side is outside. About 1 ms.

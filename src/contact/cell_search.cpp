@@ -155,8 +155,7 @@ class CellSearch {
     const Vec3 n = s.turn * on.normal;
     double ball = 0;
     const double range = kChord * (reach + (n - e).norm());
-    if (range < kWidest)
-      ball = kRounded * s.scale * s.shape->profile_radii.within(cosine, sine, range).radius;
+    if (range < kWidest) ball = kRounded * s.scale * s.shape->profile_radii.within(cosine, sine, range);
     circle(s, e, t, u, reach, s.centre + s.scale * (s.turn * on.point), n, ball, sine, out);
     if (ball > 0 || !(sine > kAxial * reach) || reach > kWidest) return;
     // A crease, it may be: circles on either side.

@@ -425,8 +425,7 @@ class RingSearch {
   // The same along the meridian of a body of revolution, `axis` its own, or of a ball, any axis.
   double meridian_bend(const Shape& shape, const Vec3& e, const Vec3& axis, double reach) const {
     const double cosine = e.dot(axis), sine = e.cross(axis).norm();
-    const double radius =
-        shape.proofs.sphere ? 0 : shape.profile_radii.within(cosine, sine, kChord * reach).radius;
+    const double radius = shape.proofs.sphere ? 0 : shape.profile_radii.within(cosine, sine, kChord * reach);
     if (!(sine > kNoDirection)) return radius;
     return std::max(radius, least_bend(shape, e, (axis - cosine * e) / sine, reach, false));
   }

@@ -136,7 +136,7 @@ TEST(ProfileRadii, are_bounds_of_the_support) {
     int known = 0;
     for (int k = 0; k < 20000; ++k) {
       const double a = random.uniform(0.06, M_PI - 0.06), t = random.sign() * random.log_uniform(1e-4, 0.05);
-      const double radius = shape->profile_radii.within(std::cos(a), std::sin(a), std::abs(t)).radius;
+      const double radius = shape->profile_radii.within(std::cos(a), std::sin(a), std::abs(t));
       Vec3 x, y;
       if (!(radius > 0) || !support(a, &x) || !support(a + t, &y)) continue;
       ++known;
@@ -157,7 +157,7 @@ TEST(ProfileRadii, of_spheroids_are_tight) {
     ASSERT_FALSE(shape->profile_radii.least.empty());
     for (double a = 0; a < M_PI; a += 0.01) {
       const double h = std::hypot(c * std::cos(a), std::sin(a)), w = c * c / (h * h * h);
-      const double radius = shape->profile_radii.within(std::cos(a), std::sin(a), 0).radius;
+      const double radius = shape->profile_radii.within(std::cos(a), std::sin(a), 0);
       EXPECT_LE(radius, w * (1 + 1e-6)) << c << " " << a;
       EXPECT_GE(radius, (c < 0.1 ? 0.6 : 0.9) * w) << c << " " << a;
     }
@@ -171,8 +171,8 @@ TEST(ProfileRadii, are_zero_at_kinks) {
   for (const float r : cone.shape->profile_radii.least) EXPECT_EQ(r, 0);
   const Solid sharp = test::lens(random, 1.5);
   ASSERT_FALSE(sharp.shape->profile_radii.least.empty());
-  EXPECT_EQ(sharp.shape->profile_radii.within(0, 1, 0.01).radius, 0);
-  EXPECT_NEAR(sharp.shape->profile_radii.within(0.99, std::sqrt(1 - 0.99 * 0.99), 0.01).radius, 1.5, 0.01);
+  EXPECT_EQ(sharp.shape->profile_radii.within(0, 1, 0.01), 0);
+  EXPECT_NEAR(sharp.shape->profile_radii.within(0.99, std::sqrt(1 - 0.99 * 0.99), 0.01), 1.5, 0.01);
 }
 
 }  // namespace
