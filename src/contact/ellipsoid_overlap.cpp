@@ -14,8 +14,8 @@ namespace {
 constexpr double kShare = 0.5;       // of the tolerance, between the overlap and its level
 constexpr double kMostNoise = 0.1;   // of it, that round-off of a test may take
 constexpr double kNoise = 2e-15;     // of a matrix
-constexpr int kMostTests = 1500;     // 30 to 60 are usual
-constexpr int kMostWeights = 30;     // m tried in one
+constexpr int kMostTests = 1000;     // 30 to 60 are usual
+constexpr int kMostWeights = 100;    // m tried in one
 constexpr double kWidest = 1;        // interval, of the logarithm of the ratio
 constexpr double kNarrowest = 1e-9;  // ... which is none any more
 constexpr double kLargeRatio = 1e15;
@@ -263,7 +263,6 @@ class Search {
     const double size2_a = of_a * a_.most * a_.most, size2_b = of_b * b_.most * b_.most, depth = level(),
                  depth2 = depth * depth, noise = kNoise * (size2_a + (b_.is_segment() ? 0 : size2_b));
     out_of_digits_ = noise > kMostNoise * tolerance_ * depth;
-    if (out_of_digits_) return false;
     m.diagonal().array() -= noise;
     if (b_.is_segment()) m(2, 2) -= kNoise * size2_b;
     // By N^-1 o . o as a function of m, log of the sum is convex in the logarithm of m: Newton, in a bracket.

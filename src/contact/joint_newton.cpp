@@ -114,13 +114,15 @@ struct Normal {
 NURBS_INLINE Normal outward(const JetLanes& j, const SurfacePoint& at, double size) {
   const Vec3 su = j.at(Slot::kSu), sv = j.at(Slot::kSv);
   const double lu = su.squaredNorm(), lv = sv.squaredNorm();
-  constexpr double kLost = kPoleNormal * kPoleNormal;
+  constexpr double kLost = kPoleNormal * kPoleNormal, kFading = 1e4;
   Normal n{su.cross(sv), lu < kLost * lv || lv < kLost * lu};
   const double shorter = std::min(lu, lv);
-  if (shorter < kNearPole * kNearPole * std::max(lu, lv) && !n.polar)
+  const Vec3 suv = j.at(Slot::kSuv);
+  // Towards a pole a tangent fades; across a narrow strip it is short all along, and its limit says nothing.
+  const bool fades = n.polar && suv.squaredNorm() > kFading * shorter;
+  if (shorter < kNearPole * kNearPole * std::max(lu, lv) && !fades)
     n.noise = kTangentNoise * size / std::sqrt(shorter);
-  if (n.polar) {
-    const Vec3 suv = j.at(Slot::kSuv);
+  if (fades) {
     n.direction = lu < lv ? suv.cross(sv) : su.cross(suv);
     if ((lu < lv ? at.v : at.u) >= 0.5) n.direction = -n.direction;
   }

@@ -9,6 +9,8 @@
 #include "body/support.h"
 #include "contact/pair_search.h"
 #include "io/pair_case.h"
+#include "shapes/primitives.h"
+#include "shapes/revolved.h"
 #include "support/bodies.h"
 #include "support/cases.h"
 #include "support/pairs.h"
@@ -126,6 +128,30 @@ TEST(DeepContacts, points_lie_on_their_bodies_where_caps_prove_the_minimum) {
     };
     EXPECT_NEAR(beyond(c.a, r.normal, r.point_a), 0, allowed);
     EXPECT_NEAR(beyond(c.b, -r.normal, r.point_b - (c.b.x - c.a.x)), 0, allowed);
+  }
+}
+
+// Across a strip of 1e-9 of the body a tangent is as short as next to a pole, where the normal is a limit: it
+// was taken for that, pointed anywhere, and a ball in the body came back as 300 away, certified.
+TEST(DeepContacts, a_narrow_strip_is_no_pole) {
+  Random random(7);
+  const ShapePointer ball = make_shape("ball", exact_ellipsoid(Vec3(1, 1, 1)));
+  for (const double length : {1e-12, 1e-10, 1e-9}) {
+    const ShapePointer about = make_shape("about", capsule(0.5, length));
+    for (int k = 0; k < 150; ++k) {
+      const Particle a{ball.get(), 1, Vec3::Zero(), random.turn()},
+          b{about.get(), random.log_uniform(0.1, 1e3), random.log_uniform(1e-12, 0.1) * random.direction(),
+            random.turn()};
+      double memory[kPairMemorySize] = {0};
+      ContactSettings settings;
+      settings.reach = 0;
+      const ContactResult r = find_contact(a, b, settings, memory);
+      const double gap = b.x.norm() - 1 - b.scale * 0.5, allowed = 1e-5 * (1 + b.scale);
+      ASSERT_NE(r.status, Status::separated) << length << " " << k;
+      ASSERT_LE(r.lower, gap + allowed);
+      ASSERT_GE(r.upper, gap - allowed);
+      ASSERT_NEAR(r.gap, gap, allowed);
+    }
   }
 }
 
