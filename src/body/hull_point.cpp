@@ -44,8 +44,8 @@ HullPoint HullPoints::near(const Vec3& d) const {
   if (form_ != Form::patches) return along(d);
   const DirectionAtlas& atlas = shape_.atlas;
   const int node = atlas.nearest(d);
-  return {
-      atlas.point[node], atlas.direction(node).normalized(), atlas.support_upper(d), {{}, atlas.where[node]}};
+  const Support s = look_at(shape_, atlas.direction(node).normalized(), atlas.where[node]);
+  return {s.point, s.normal, atlas.support_upper(d), {{}, s.where}};
 }
 
 HullPoint HullPoints::on_ellipsoid(const Vec3& d) const {

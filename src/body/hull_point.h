@@ -32,7 +32,7 @@ class HullPoints {
   // meridian, else find_hull_support. `start` may be null.
   HullPoint along(const Vec3& d, const HullPlace* start = nullptr) const;
   // The same of a direction near d, as far as that spares a search, with an upper bound along d that is a
-  // little loose: for a first solid. 20 ns.
+  // little loose: for a first solid. 60 ns.
   HullPoint near(const Vec3& d) const;
   // d(point)/d(direction) in the tangent plane of d spanned by t and s, of a point found along `asked`, which
   // is near d: what the support function bends by. Zero at corners, of rank 1 on edges. False where there is

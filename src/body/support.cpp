@@ -419,6 +419,14 @@ Support search_all_patches(const Shape& shape, const Vec3& d, const SurfacePoint
   return search_patches(shape, d, low, nullptr);
 }
 
+Support look_at(const Shape& shape, const Vec3& d, const SurfacePoint& at) {
+  const Jet1 jet = evaluate1(shape.patches[at.patch], at.u, at.v);
+  Support s;
+  set_point(shape, d, at, jet.s, jet.su, jet.sv, &s);
+  s.upper = std::numeric_limits<double>::infinity();
+  return s;
+}
+
 Support confirm_support(const Shape& shape, const Vec3& d, const SurfacePoint& at) {
   const Jet1 jet = evaluate1(shape.patches[at.patch], at.u, at.v);
   Support s;

@@ -61,6 +61,32 @@ TEST(HullPoints, are_the_hulls_supports) {
   EXPECT_GT(closed, 1500) << "closed forms were hardly asked";
 }
 
+// Of a direction beside: a point of the body with its own normal, so that a ball that rolls inside, set back
+// along it, stays inside; and an upper bound along the direction asked for.
+TEST(HullPoints, beside_a_direction) {
+  Random random(43);
+  for (const ShapePointer& shape : bodies()) {
+    const double size = shape->bounding_radius, noise = 1e-13 * size;
+    const HullPoints points(*shape, 1e-10 * size, 1e-10 * size);
+    const double ball = std::min(shape->curvature.min_radius, shape->inner_radius);
+    for (int k = 0; k < 200; ++k) {
+      const Vec3 d = random.direction();
+      const HullPoint beside = points.near(d);
+      EXPECT_GE(beside.upper, find_hull_support(*shape, d, nullptr, 0).h - points.error() - noise);
+      EXPECT_TRUE(ball == 0 || (beside.normal - d).norm() < 0.5) << shape->name;
+      const Vec3 center = beside.point - ball * beside.normal;
+      for (int i = 0; i < 20; ++i) {
+        const Vec3 other =
+            i % 2 ? random.direction()
+                  : (beside.normal + random.log_uniform(1e-6, 1) * random.direction()).normalized();
+        ASSERT_LE(other.dot(center) + ball,
+                  find_hull_support(*shape, other, nullptr, 0).upper + points.error() + noise)
+            << shape->name;
+      }
+    }
+  }
+}
+
 // d(point)/d(direction), square to the direction, against central differences where the body bends.
 TEST(HullPoints, turn_as_their_differences_do) {
   Random random(42);
