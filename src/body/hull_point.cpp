@@ -84,10 +84,7 @@ HullPoint HullPoints::on_patches(const Vec3& d, const HullPlace* start) const {
 bool HullPoints::turn(const HullPlace& at, const Vec3& d, const Vec3& asked, const Vec3& t, const Vec3& s,
                       Mat2* turn) const {
   if (form_ == Form::ellipsoid) {
-    const Mat3& root = shape_.ellipsoid.root;
-    const Vec3 k = root * d, kt = root * t, ks = root * s;
-    const double h = k.norm(), xt = k.dot(kt) / h, xs = k.dot(ks) / h, ts = (kt.dot(ks) - xt * xs) / h;
-    *turn << (kt.squaredNorm() - xt * xt) / h, ts, ts, (ks.squaredNorm() - xs * xs) / h;
+    *turn = root_support(shape_.ellipsoid.root, d, t, s).turn;
     return true;
   }
   if (form_ == Form::points) {

@@ -101,5 +101,13 @@ class LazyInnerMap {
   }
   std::shared_ptr<Made> made_ = std::make_shared<Made>();
 };
+// Made on the other side where it was here.
+template <class Archive>
+void archive(Archive& a, LazyInnerMap& s) {
+  bool made = s.made();
+  InnerMap map = s.known();
+  a(made, map);
+  if (made) s.set(std::move(map));
+}
 
 }  // namespace nurbs

@@ -249,6 +249,10 @@ Normal set_point(const Shape& shape, const Vec3& d, const SurfacePoint& at, cons
   s->h = d.dot(x);
   return normal;
 }
+Normal set_point(const Shape& shape, const Vec3& d, const SurfacePoint& at, Support* s) {
+  const Jet1 jet = evaluate1(shape.patches[at.patch], at.u, at.v);
+  return set_point(shape, d, at, jet.s, jet.su, jet.sv, s);
+}
 
 // Ascent from `at` to a local maximum of d . s.
 Support climb(const Shape& shape, const Vec3& d, SurfacePoint at) {
@@ -420,17 +424,15 @@ Support search_all_patches(const Shape& shape, const Vec3& d, const SurfacePoint
 }
 
 Support look_at(const Shape& shape, const Vec3& d, const SurfacePoint& at) {
-  const Jet1 jet = evaluate1(shape.patches[at.patch], at.u, at.v);
   Support s;
-  set_point(shape, d, at, jet.s, jet.su, jet.sv, &s);
+  set_point(shape, d, at, &s);
   s.upper = std::numeric_limits<double>::infinity();
   return s;
 }
 
 Support confirm_support(const Shape& shape, const Vec3& d, const SurfacePoint& at) {
-  const Jet1 jet = evaluate1(shape.patches[at.patch], at.u, at.v);
   Support s;
-  const Normal normal = set_point(shape, d, at, jet.s, jet.su, jet.sv, &s);
+  const Normal normal = set_point(shape, d, at, &s);
   s.upper = s.h + excess_at(shape, d, at, normal) + kRoundoff * shape.bounding_radius;
   s.converged = true;
   if (is_certain(shape, s, 0)) return s;

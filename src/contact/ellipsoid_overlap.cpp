@@ -136,16 +136,10 @@ class Search {
       Mat2 bend = -p * Mat2::Identity();
       Vec3 apart = -offset_;
       for (const SweptEllipsoid* body : {&a_, &b_}) {
-        const Vec3 at = body->root * d, at_t = body->root * t, at_s = body->root * s;
-        const double h = at.norm();
-        if (!(h > 0)) continue;
-        const double xt = at.dot(at_t) / h, xs = at.dot(at_s) / h;
-        apart += body->root * at / h;
-        bend(0, 0) += (at_t.squaredNorm() - xt * xt) / h;
-        bend(1, 1) += (at_s.squaredNorm() - xs * xs) / h;
-        bend(0, 1) += (at_t.dot(at_s) - xt * xs) / h;
+        const RootSupport met = root_support(body->root, d, t, s);
+        apart += met.point;
+        bend += met.turn;
       }
-      bend(1, 0) = bend(0, 1);
       const Vec2 step = newton(bend, Vec2(apart.dot(t), apart.dot(s)));
       Vec3 by = step[0] * t + step[1] * s;
       if (b_.is_segment() && d[2] * (d[2] + by[2]) < 0) {
@@ -333,6 +327,16 @@ class Search {
 };
 
 }  // namespace
+
+SweptEllipsoid SweptEllipsoid::of(const Ellipsoid& e, double scale, const Mat3& turn) {
+  return {scale * (turn * e.root * turn.transpose()), scale * e.least(), scale * e.semi.maxCoeff(), 0};
+}
+
+SweptEllipsoid SweptEllipsoid::along(const Vec3& half, double ball) {
+  SweptEllipsoid s{Mat3::Zero(), 0, half.norm(), ball};
+  if (s.most > 0) s.root = half * half.transpose() / s.most;
+  return s;
+}
 
 Vec3 SweptEllipsoid::point(const Vec3& d) const {
   const Vec3 at = root * d;

@@ -2,6 +2,7 @@
 // dimension is searched, and a step of it is a test of one 3 x 3 matrix.
 #pragma once
 
+#include "body/ellipsoid.h"
 #include "nurbs/types.h"
 
 namespace nurbs {
@@ -12,6 +13,10 @@ struct SweptEllipsoid {
   Mat3 root = Mat3::Zero();    // symmetric, no negative eigenvalue
   double least = 0, most = 0;  // semi-axes
   double ball = 0;
+
+  // A body in its own axes, which `turn` turns into others; what a ball sweeps along `half` both ways.
+  static SweptEllipsoid of(const Ellipsoid& e, double scale, const Mat3& turn);
+  static SweptEllipsoid along(const Vec3& half, double ball);
 
   double height(const Vec3& d) const { return (root * d).norm(); }  // of the ellipsoid alone
   Vec3 point(const Vec3& d) const;  // ... and where; the centre where that is all of a segment

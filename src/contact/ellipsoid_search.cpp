@@ -30,9 +30,7 @@ Placed put(const Particle& p, double (&root)[6], double& least2) {
 }
 
 SweptEllipsoid swept_ellipsoid(const Particle& p) {
-  const Ellipsoid& e = p.shape->ellipsoid;
-  const Mat3 turn = p.q.toRotationMatrix();
-  return {p.scale * (turn * e.root * turn.transpose()), p.scale * e.least(), p.scale * e.semi.maxCoeff(), 0};
+  return SweptEllipsoid::of(p.shape->ellipsoid, p.scale, p.q.toRotationMatrix());
 }
 
 // A pair of bodies and how well it is to be solved.

@@ -117,12 +117,12 @@ NURBS_INLINE Normal outward(const JetLanes& j, const SurfacePoint& at, double si
   constexpr double kLost = kPoleNormal * kPoleNormal, kFading = 1e4;
   Normal n{su.cross(sv), lu < kLost * lv || lv < kLost * lu};
   const double shorter = std::min(lu, lv);
-  const Vec3 suv = j.at(Slot::kSuv);
   // Towards a pole a tangent fades; across a narrow strip it is short all along, and its limit says nothing.
-  const bool fades = n.polar && suv.squaredNorm() > kFading * shorter;
+  const bool fades = n.polar && j.at(Slot::kSuv).squaredNorm() > kFading * shorter;
   if (shorter < kNearPole * kNearPole * std::max(lu, lv) && !fades)
     n.noise = kTangentNoise * size / std::sqrt(shorter);
   if (fades) {
+    const Vec3 suv = j.at(Slot::kSuv);
     n.direction = lu < lv ? suv.cross(sv) : su.cross(suv);
     if ((lu < lv ? at.v : at.u) >= 0.5) n.direction = -n.direction;
   }

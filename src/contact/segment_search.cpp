@@ -30,6 +30,17 @@ Segment segment_of(const SpheroPolyhedron& core, double scale, const Mat3& turn,
   return {0.5 * (p + q), 0.5 * (p - q)};
 }
 
+// Contact points along the bracket's direction, and where the surfaces' searches begin the next time.
+void set_points(const PairFrame& pair, const Vec3& a, const Vec3& b, PolytopeResult* r) {
+  r->points.na = r->bracket.direction;
+  r->points.nb = -r->points.na;
+  r->points.a = a;
+  r->points.b = b;
+  part_points(r);
+  r->points.on_a = find_hull_support(*pair.a, r->points.na).where;
+  r->points.on_b = find_hull_support(*pair.b, pair.direction_on_b(r->points.na)).where;
+}
+
 }  // namespace
 
 bool search_segments(const PairFrame& pair, double tolerance, PolytopeResult* result) {
@@ -74,13 +85,7 @@ bool search_segments(const PairFrame& pair, double tolerance, PolytopeResult* re
   r.converged = true;
   r.iterations = 1;
   r.gap = std::clamp(between.norm() - radius_a - radius_b, r.bracket.lower, r.bracket.upper);
-  r.points.na = normal;
-  r.points.nb = -normal;
-  r.points.a = x + radius_a * normal;
-  r.points.b = y - radius_b * normal;
-  part_points(&r);
-  r.points.on_a = find_hull_support(*pair.a, normal).where;
-  r.points.on_b = find_hull_support(*pair.b, pair.direction_on_b(normal)).where;
+  set_points(pair, x + radius_a * normal, y - radius_b * normal, &r);
   return true;
 }
 
@@ -98,11 +103,8 @@ bool search_segment_in_ellipsoid(const PairFrame& pair, const Vec3& seed, double
   const Vec3 center = first ? Vec3(Vec3::Zero()) : pair.offset;
   const Segment segment = first ? segment_of(swept.core, scale_swept, pair.turn, pair.offset)
                                 : segment_of(swept.core, scale_swept, Mat3::Identity(), Vec3::Zero());
-  const double length = segment.half.norm();
-  SweptEllipsoid a{scale * (turn * round.ellipsoid.root * turn.transpose()), scale * round.ellipsoid.least(),
-                   scale * round.ellipsoid.semi.maxCoeff(), 0},
-      b{Mat3::Zero(), 0, length, scale_swept * swept.core.radius};
-  if (length > 0) b.root = segment.half * segment.half.transpose() / length;
+  const SweptEllipsoid a = SweptEllipsoid::of(round.ellipsoid, scale, turn),
+                       b = SweptEllipsoid::along(segment.half, scale_swept * swept.core.radius);
   const Vec3 start =
       seed.squaredNorm() > 0 ? Vec3((first ? 1 : -1) * seed.normalized()) : Vec3(Vec3::UnitX());
   LeastOverlap least;
@@ -122,13 +124,7 @@ bool search_segment_in_ellipsoid(const PairFrame& pair, const Vec3& seed, double
   r.converged = r.closed = r.bracket.width() <= tolerance;
   r.iterations = least.tests;
   r.gap = -least.overlap;
-  r.points.na = r.bracket.direction;
-  r.points.nb = -r.points.na;
-  r.points.a = first ? on_round : on_swept;
-  r.points.b = first ? on_swept : on_round;
-  part_points(&r);
-  r.points.on_a = find_hull_support(*pair.a, r.points.na).where;
-  r.points.on_b = find_hull_support(*pair.b, pair.direction_on_b(r.points.na)).where;
+  set_points(pair, first ? on_round : on_swept, first ? on_swept : on_round, &r);
   return r.converged;
 }
 

@@ -139,6 +139,13 @@ Pair deep_pair(const Shape& a, const Shape& b, Random& random) {
   return pair;
 }
 
+// Whose bodies have their inner maps.
+PairFrame mapped(const Pair& p) {
+  p.a.shape->inner_map();
+  p.b.shape->inner_map();
+  return PairFrame(p.a, p.b);
+}
+
 // Pairs that can do without never make a map, however many are deep; with one they find the same.
 TEST(InnerMap, is_used_where_it_is_there_and_not_made_by_pairs_that_do_without) {
   const std::vector<NurbsSurface> grain = pebble();
@@ -170,9 +177,7 @@ TEST(DeepSearch, no_direction_overlaps_by_less_than_is_proven) {
   int proven = 0, tried = 0;
   for (int k = 0; k < 600; ++k) {
     const Pair p = deep_pair(*shapes[random.below(6)], *shapes[random.below(6)], random);
-    p.a.shape->inner_map();
-    p.b.shape->inner_map();
-    const PairFrame pair(p.a, p.b);
+    const PairFrame pair = mapped(p);
     const double tolerance = 1e-9 * pair.size;
     JointSolution s;
     s.iterations = 0;
@@ -209,9 +214,7 @@ TEST(DeepSearch, proves_minima_of_pebbles) {
     p.a.q = random.turn();
     p.b.q = random.turn();
     p.b.x = random.uniform(0, 0.4) * shape.inner_radius * random.direction();
-    p.a.shape->inner_map();
-    p.b.shape->inner_map();
-    const PairFrame pair(p.a, p.b);
+    const PairFrame pair = mapped(p);
     const double tolerance = 1e-9 * pair.size;
     JointSolution s;
     s.iterations = 0;
@@ -240,9 +243,7 @@ TEST(Polytope, no_direction_overlaps_by_less_than_is_proven) {
   int proven = 0;
   for (int k = 0; k < 400; ++k) {
     const Pair p = deep_pair(*shapes[random.below(8)], *shapes[random.below(8)], random);
-    p.a.shape->inner_map();
-    p.b.shape->inner_map();
-    const PairFrame pair(p.a, p.b);
+    const PairFrame pair = mapped(p);
     const PolytopeResult hull = solve_polytope(pair, Vec3::Zero(), 1e-9 * pair.size, kFarAway);
     proven += hull.converged;
     const double least = -hull.bracket.upper, noise = 1e-13 * pair.reach;
@@ -263,9 +264,7 @@ TEST(DeepSearch, a_local_minimum_is_not_taken_for_the_least) {
     Pair p = deep_pair(*disc(), *ellipsoid(), random);
     p.b.scale = 0.3;
     p.b.x = p.a.q * Vec3(0.6, 0.1, 0.05);
-    p.a.shape->inner_map();
-    p.b.shape->inner_map();
-    const PairFrame pair(p.a, p.b);
+    const PairFrame pair = mapped(p);
     const Vec3 rim = Vec3::UnitX(), on_b = pair.direction_on_b(rim);
     JointSolution s = solve_joint(pair, find_hull_support(*pair.a, rim).where,
                                   find_hull_support(*pair.b, on_b).where, 1e-9, kFarAway, 20);
@@ -294,9 +293,7 @@ TEST(DeepSearch, a_saddle_is_not_taken_for_a_minimum) {
     p.a.shape = p.b.shape = shape.get();
     const Vec3 d = turn.col(1);
     p.b.x = (2 - random.log_uniform(0.02, 0.5)) * (b - c * c / b) * d;
-    p.a.shape->inner_map();
-    p.b.shape->inner_map();
-    const PairFrame pair(p.a, p.b);
+    const PairFrame pair = mapped(p);
     const double tolerance = 1e-9 * pair.size;
     JointSolution s = solve_joint(pair, find_hull_support(*shape, d).where,
                                   find_hull_support(*shape, -d).where, tolerance, kFarAway, 20);
