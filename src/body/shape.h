@@ -20,6 +20,7 @@
 #include "body/profile_radii.h"
 #include "body/revolution.h"
 #include "body/rolling.h"
+#include "body/round_edges.h"
 #include "body/sphero_polyhedron.h"
 #include "body/support_cells.h"
 #include "nurbs/bezier_patch.h"
@@ -167,13 +168,14 @@ struct Shape {
   NormalMap normal_map;                    // local bounds, for bodies with flats or dents
   DirectionAtlas atlas;
   LazyInnerMap lazy_inner_map;
-  SupportCells support_cells;  // where the hull's supports lie, near dents
-  Ellipsoid ellipsoid;         // that the body is, if it is one
-  Revolution revolution;       // about an axis, if the body is one
-  Meridian meridian;           // whose profile this is; empty for other bodies
-  ProfileRadii profile_radii;  // of that
-  SpheroPolyhedron core;       // hull of points, and a ball, that the body is, if it is one
-  FlatFeatures flats;          // faces, creases and ruled lines; empty for round bodies
+  SupportCells support_cells;           // where the hull's supports lie, near dents
+  Ellipsoid ellipsoid;                  // that the body is, if it is one
+  Revolution revolution;                // about an axis, if the body is one
+  Meridian meridian;                    // whose profile this is; empty for other bodies
+  ProfileRadii profile_radii;           // of that
+  SpheroPolyhedron core;                // hull of points, and a ball, that the body is, if it is one
+  std::vector<RoundEdges> round_edges;  // none of bodies of revolution
+  FlatFeatures flats;                   // faces, creases and ruled lines; empty for round bodies
 
   // Balls inside the body over directions, which spare deep contacts of round bodies a search. Made the first
   // time, before a run: 10 to 100 ms.

@@ -145,6 +145,12 @@ NURBS_INLINE Vec3 turned_normal(const Vec3& n, const Forms& f, const Symmetric& 
   return n - (inverse.a * hu + inverse.b * hv) * f.su - (inverse.b * hu + inverse.c * hv) * f.sv;
 }
 
+// Whether a step stays on its patch: along ruled lines, where nothing else holds it, it may go far beyond.
+NURBS_INLINE bool stays_on_patch(const SurfacePoint& at, const Vec2& d) {
+  const double u = at.u + d[0], v = at.v + d[1];
+  return std::min(std::min(u, v), std::min(1 - u, 1 - v)) >= -kBeyondPatch;
+}
+
 // How far the points are from lying on one line along d, squared.
 double misfit2(const Vec3& d, const Vec3& g) {
   return (g - d.dot(g) * d).squaredNorm();
@@ -154,7 +160,8 @@ double misfit2(const Vec3& d, const Vec3& g) {
 NURBS_INLINE bool refine(const PairFrame& pair, JointSolution& s, const Forms& a, const Forms& b,
                          const Steps& steps) {
   PointPair& p = s.points;
-  if (!turns_linearly(s.jet_a, steps.a) || !turns_linearly(s.jet_b, steps.b) || b.first.singular())
+  if (!turns_linearly(s.jet_a, steps.a) || !turns_linearly(s.jet_b, steps.b) || b.first.singular() ||
+      !stays_on_patch(p.on_a, steps.a) || !stays_on_patch(p.on_b, steps.b))
     return false;
   // b.second was taken along A's normal, which is -n_B here up to second order. The normal that turned less
   // is known better: a flat's, or that of much the larger body.

@@ -24,6 +24,7 @@ constexpr double kGuessAbove = 0.1;    // of the smaller radius: a guess that mu
 constexpr double kSameGuess = 0.9995;  // cosine between refined guesses: the atlases tell no more apart
 constexpr double kOnFeature = 0.97;    // cosine between a direction and its support's normal: less on an edge
 constexpr double kNearlyClosed = 100;  // tolerances
+constexpr double kOffSurface = 1e-7;   // of the body: polished points may be
 constexpr double kNormalShare = 0.5;   // of the tolerance, by which the overlap along a normal may exceed it
 
 bool set_separated(double lower, double reach, Rung rung, ContactResult* r) {
@@ -286,6 +287,17 @@ class Ladder {
     return -pair.overlap_along(s.normal, a.h, b.h) >= gap - kNormalShare * tolerance;
   }
 
+  // Newton's last step is taken to second order: a long one, as along lines where nothing holds it, leads off
+  // the surface.
+  static bool is_on_surfaces(const PairFrame& pair, const PointPair& p) {
+    const auto near = [&](const Shape& shape, const SurfacePoint& at, double scale, const Vec3& x) {
+      return lies_on(shape, at) && (scale * evaluate0(shape.patches[at.patch], at.u, at.v) - x).norm() <=
+                                       kOffSurface * scale * shape.bounding_radius;
+    };
+    return near(*pair.a, p.on_a, pair.scale_a, p.a) &&
+           near(*pair.b, p.on_b, pair.scale_b, pair.turn.transpose() * (p.b - pair.offset));
+  }
+
   // A bracket that stays open without the inner maps is worth them.
   ContactResult fallback(const PairFrame& pair, const JointSolution* known, const Vec3& seed,
                          double tolerance, int spent) {
@@ -333,7 +345,7 @@ class Ladder {
     }
     const double lower = std::max(hull.bracket.lower, joint.bracket.lower);
     const double gap = std::clamp(joint.gap, lower, std::max(lower, hull.bracket.upper));
-    if (polished && agrees(pair, joint, gap, tolerance)) {
+    if (polished && is_on_surfaces(pair, joint.points) && agrees(pair, joint, gap, tolerance)) {
       hull.points = joint.points;
       hull.bracket.direction = joint.normal;
       hull.bracket.lower = lower;

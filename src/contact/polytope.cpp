@@ -54,6 +54,8 @@ constexpr double kCapDepth = 0.4;         // of the tolerance, that a cap proves
 constexpr double kCapUsed = 0.8;          // of a cap's angle: the rest is for lower minima found later
 constexpr double kWidestCap = 0.42, kLeastCap = 1e-4, kNextCap = 0.75;  // rad
 constexpr double kPlaneBeyond = 4;   // times the least distance, squared: no triangle in it is nearer
+constexpr double kFacing = 1e-6;     // of the smaller body: witnesses may be off each other by
+constexpr int kMostFacing = 96;      // points spent on better ones
 constexpr double kOffNormal = 1e-6;  // rad, given away for round-off
 // A cap whose bodies are cut to their cores about it, below.
 constexpr double kOffSupport = 1e-4;  // rad
@@ -228,13 +230,33 @@ class Search {
     return r;
   }
 
-  PolytopeResult result() const {
+  // Ends the search: the hull may be made again for the points.
+  PolytopeResult result() {
+    Vec3 a, b;
+    find_witness(&a, &b);
+    return with_points(a, b);
+  }
+
+  // Points for a bracket that was closed by other means.
+  bool find_points(PolytopeResult* r) {
+    lower_ = r->bracket.lower;
+    upper_ = r->bracket.upper;
+    direction_ = r->bracket.direction;
+    if (!start(direction_)) return false;
+    Vec3 a, b;
+    refine_pair(&a, &b);
+    const int spent = r->iterations;
+    *r = with_points(a, b);
+    r->iterations += spent;
+    return r->converged;
+  }
+
+ private:
+  PolytopeResult with_points(const Vec3& a, const Vec3& b) const {
     PolytopeResult r = bracket();
     r.points.na = direction_;
     r.points.nb = -direction_;
     const Witness& w = witness_[best_];
-    Vec3 a = w.a, b = w.b;
-    find_witness(&a, &b);
     r.points.a = a + shrink_a_ * direction_;
     r.points.b = b - shrink_b_ * direction_;
     r.points.on_a = surface_place(*pair_.a, w.on_a, direction_);
@@ -249,7 +271,6 @@ class Search {
     return r;
   }
 
- private:
   static HullPoints hull_points(const Shape& shape, double scale, double tolerance) {
     return HullPoints(shape, kSupportShare * tolerance / scale, kCoreError * tolerance / scale);
   }
@@ -522,9 +543,10 @@ class Search {
     for (int k = 0; k < caps_; ++k) {
       Cap& cap = cap_[k];
       cap.level = std::min(cap.level, level);
-      const bool serves = level > tolerance_;
-      hull_.move(cap.vertex, serves ? Vec3(cap.level / cap.used * cap.d) : hull_.point(cap.from));
-      witness_[cap.vertex].cap = serves;
+      if (level > tolerance_)
+        hull_.move(cap.vertex, cap.level / cap.used * cap.d);
+      else
+        give_back(cap);
     }
     if (!(level > tolerance_)) caps_ = 0;
     Vec3 across;
@@ -697,30 +719,64 @@ class Search {
     return (edge.dot(closest) * edge - closest).normalized();
   }
 
-  // The witnesses of direction_: the hull's point nearest to the origin or, when that is inside, to its foot
-  // on the supporting plane. A flat of the obstacle is several triangles; witnesses from another one, or from
-  // the far side of a body that has two equal minima, would not face each other. About a minimum whose cap is
-  // proven the hull stays coarse, and what is given away there belongs to neither body: where the supports
-  // along direction_, *a and *b at first, face each other more nearly, they stay.
-  void find_witness(Vec3* a, Vec3* b) const {
-    const Vec3 target = std::min(0.0, lower_ + shrink_) * -direction_;
+  // What the witnesses of direction_ are to be apart: the hull's point nearest to the origin or, when that is
+  // inside, its foot on the supporting plane. (Of a flat of the obstacle, which is several triangles, or of
+  // two equal minima other points would not face each other.)
+  Vec3 target() const { return std::min(0.0, lower_ + shrink_) * -direction_; }
+
+  // Points of the bodies that are as nearly so as the supports along direction_ or one of the hull's
+  // triangles has them. About a minimum whose cap is proven the hull stays coarse, and what is given away
+  // there belongs to neither body: where the supports do not face each other, as on ruled lines, it is made
+  // again without.
+  void find_witness(Vec3* a, Vec3* b) {
+    int near;
+    if (find_nearest_pair(a, b, &near) <= kFacing * pair_.size || caps_ == 0) return;
+    for (int k = 0; k < caps_; ++k) give_back(cap_[k]);
+    caps_ = 0;
+    Vec3 across;
+    if (start_from_points(0, &across)) refine_pair(a, b);
+  }
+  void refine_pair(Vec3* a, Vec3* b) {
+    int near;
+    for (int k = 0; k < kMostFacing; ++k) {
+      const double off = find_nearest_pair(a, b, &near);
+      if (off <= std::max(tolerance_, roundoff()) || near < 0) return;
+      const Vec3 towards = target() - (*a - *b);
+      const int v = query(towards.normalized(), closest_of(hull_.face(near), direction_));
+      if (v < 0 || hull_.grow(v, 0.0, near) != GrowingHull::Growth::grown) return;
+    }
+  }
+  void give_back(const Cap& cap) {
+    hull_.move(cap.vertex, hull_.point(cap.from));
+    witness_[cap.vertex] = witness_[cap.from];
+  }
+
+  // How far the pair of witnesses is from the target; *near: the triangle they come from, or -1.
+  double find_nearest_pair(Vec3* a, Vec3* b, int* near) const {
+    const Vec3 target = this->target();
+    *a = witness_[best_].a;
+    *b = witness_[best_].b;
+    *near = -1;
     double best = (*a - *b - target).squaredNorm();
     for (int k = 0; k < hull_.faces(); ++k) {
       const GrowingHull::Face& f = hull_.face(k);
       if (!f.alive) continue;
       const double above = f.normal.dot(target) - f.offset;  // 0 of slivers
       if (above * above > kPlaneBeyond * best) continue;
+      if (std::any_of(f.vertex.begin(), f.vertex.end(), [&](short v) { return witness_[v].cap; })) continue;
       const Vec3 &p = hull_.point(f.vertex[0]), &q = hull_.point(f.vertex[1]), &r = hull_.point(f.vertex[2]);
       const Vec3 w = nearest_on_triangle(p - target, q - target, r - target);
       const double distance = (w[0] * p + w[1] * q + w[2] * r - target).squaredNorm();
       if (!(distance < best)) continue;
       best = distance;
+      *near = k;
       *a = *b = Vec3::Zero();
       for (int i = 0; i < 3; ++i) {
         *a += w[i] * witness_[f.vertex[i]].a;
         *b += w[i] * witness_[f.vertex[i]].b;
       }
     }
+    return std::sqrt(best);
   }
 
   const PairFrame& pair_;
@@ -752,6 +808,19 @@ bool is_polar(const PairFrame& pair, const Vec3& d) {
   return along(*pair.a, pair.a->revolution.axis) || along(*pair.b, pair.turn * pair.b->revolution.axis);
 }
 
+// Rings and cells know few points of the bodies, which may not face each other where it takes three or four
+// to carry the contact.
+__attribute__((noinline)) void make_points_face(const PairFrame& pair, double tolerance, PolytopeResult* r) {
+  const Vec3 apart = r->points.b - r->points.a;
+  if (!(apart.cross(r->bracket.direction).norm() > kFacing * pair.size)) return;
+  PolytopeResult better = *r;
+  if (Search(pair, tolerance, 0.0, false).find_points(&better)) *r = better;
+}
+
+bool has_rings(const Shape& shape) {
+  return shape.revolution.found || !shape.round_edges.empty();
+}
+
 }  // namespace
 
 PolytopeResult solve_polytope(const PairFrame& pair, const Vec3& seed, double tolerance, double enough) {
@@ -773,7 +842,7 @@ PolytopeResult solve_polytope(const PairFrame& pair, const Vec3& seed, double to
       --attempt;
       continue;
     }
-    if (started && attempt == 0 && (pair.a->revolution.found || pair.b->revolution.found)) {
+    if (started && attempt == 0 && (has_rings(*pair.a) || has_rings(*pair.b))) {
       const bool bent =
           !pair.a->lazy_inner_map.known().nodes.empty() && !pair.b->lazy_inner_map.known().nodes.empty();
       search.run(enough, bent ? kBentBeforeRings : kBeforeRings);
@@ -782,7 +851,10 @@ PolytopeResult solve_polytope(const PairFrame& pair, const Vec3& seed, double to
         search.run(enough, kAtPoles);
         best = search.bracket();
       }
-      if (!best.converged && search_rings(pair, tolerance, false, &best)) return best;
+      if (!best.converged && search_rings(pair, tolerance, false, &best)) {
+        make_points_face(pair, tolerance, &best);
+        return best;
+      }
     }
     if (started) search.run(enough, kHullVertices);
     const PolytopeResult result = search.result();
@@ -792,8 +864,9 @@ PolytopeResult solve_polytope(const PairFrame& pair, const Vec3& seed, double to
     if (best.converged || best.bracket.lower > enough || (started && !search.stalled())) break;
     from = best.bracket.direction + kHullTurn * (attempt + 1) * Vec3(0.36, -0.48, 0.8);
   }
-  if (!best.converged && !(best.bracket.lower > enough) && !search_rings(pair, tolerance, true, &best))
-    search_cells(pair, tolerance, &best);
+  if (!best.converged && !(best.bracket.lower > enough) &&
+      (search_rings(pair, tolerance, true, &best) || search_cells(pair, tolerance, &best)))
+    make_points_face(pair, tolerance, &best);
   return best;
 }
 

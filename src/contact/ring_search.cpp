@@ -12,10 +12,11 @@ constexpr int kCircleCost = 4;             // ... sectors
 constexpr double kMostSpent = 2400;        // sectors bounded, some 0.3 us each, and circles
 constexpr double kMostCompared = 1e6;      // circles in their hulls, 2 ns each
 constexpr double kMostComparedLast = 4e6;  // ... where nothing else did
-constexpr double kFirstSpent = 0.375;      // of either, after which it ends ...
-constexpr double kHopeless = 0.1;          // ... where less than this times its share of all is closed
-constexpr int kDeepestSector = 60;         // halvings of the azimuth
-constexpr double kNearAxis = 0.2;          // sine between the axes up to which both bodies' circles are used
+constexpr double kFirstSpent = 0.25;       // of either, after which it ends ...
+constexpr double kFirstSpentLast = 0.375;
+constexpr double kHopeless = 0.1;       // ... where less than this times its share of all is closed
+constexpr int kDeepestSector = 60;      // halvings of the azimuth
+constexpr double kNearAxis = 0.2;       // sine between the axes up to which both bodies' circles are used
 constexpr double kNearlyAlike = 0.1;    // of the body's radius: what directions of a ring may differ by ...
 constexpr double kHardlyAlike = 0.4;    // ... where nothing else did
 constexpr double kClosedShare = 0.9;    // of the tolerance at which a sector is closed ...
@@ -44,8 +45,9 @@ struct View {
   double ball_k = 0;       // ... and inside K
   const SpheroPolyhedron* swept = nullptr;  // M, if it is one
   double error = 0;                         // of those that are
+  const RoundEdges* arcs;                   // of K, where that is of revolution no further
 
-  View(const PairFrame& pair, bool k_is_a, bool core, double tolerance) {
+  View(const PairFrame& pair, bool k_is_a, bool core, double tolerance, const RoundEdges* part) : arcs(part) {
     sign = k_is_a ? 1 : -1;
     k = k_is_a ? pair.a : pair.b;
     m = k_is_a ? pair.b : pair.a;
@@ -54,8 +56,8 @@ struct View {
     turn_k = k_is_a ? Mat3(Mat3::Identity()) : pair.turn;
     turn_m = k_is_a ? pair.turn : Mat3(Mat3::Identity());
     offset = sign * pair.offset;
-    axis = (turn_k * k->revolution.axis).normalized();
-    point = scale_k * (turn_k * k->revolution.point);
+    axis = (turn_k * (arcs ? arcs->axis : k->revolution.axis)).normalized();
+    point = scale_k * (turn_k * (arcs ? arcs->point : k->revolution.point));
     if (m->proofs.sphere) {  // any axis is its own
       mate_axis = axis;
       mate_point = Vec3::Zero();
@@ -93,6 +95,8 @@ struct Circle {
   Angle at;     // angle from the axis it was asked for ...
   Vec3 e;       // ... and the direction
   Vec3 nk, nm;  // the surfaces' own normals there, outward from K and into M
+  Vec3 on_k;    // K's point, from `point`: of a circle, or an arc of one; or, `lone`, no other is known
+  bool lone = false;
 };
 
 // (R, Z) of a circle at one azimuth.
@@ -186,13 +190,14 @@ Least least_of_greatest(const Meridian* p, int count, Angle low, Angle high, dou
 class RingSearch {
  public:
   // `core`: of the bodies, and the balls that roll inside them, instead of the bodies.
-  RingSearch(const PairFrame& pair, bool k_is_a, bool core, double tolerance)
-      : pair_(pair), view_(pair, k_is_a, core, tolerance), tolerance_(tolerance) {
-    tangent_ = view_.axis.unitOrthogonal();
+  // `arcs`: of K, where that is not of revolution itself.
+  RingSearch(const PairFrame& pair, bool k_is_a, bool core, double tolerance, const RoundEdges* arcs)
+      : pair_(pair), view_(pair, k_is_a, core, tolerance, arcs), tolerance_(tolerance) {
+    tangent_ = arcs ? Vec3(view_.turn_k * arcs->start) : view_.axis.unitOrthogonal();
     second_ = view_.axis.cross(tangent_);
     noise_ = 2 * kRoundoff *
                  (view_.scale_k * view_.k->bounding_radius + view_.scale_m * view_.m->bounding_radius) +
-             view_.scale_k * (view_.k->revolution.error + view_.k->meridian.error) +
+             view_.scale_k * (arcs ? arcs->error : view_.k->revolution.error + view_.k->meridian.error) +
              (view_.circles ? view_.scale_m * view_.mate_error : 0.0) + view_.error;
   }
 
@@ -214,7 +219,7 @@ class RingSearch {
       const double angle = M_PI * k / (kFirstAngles - 1);
       query(direction({std::cos(angle), std::sin(angle)}, phi));
     }
-    if (!close(phi, last ? kMostComparedLast : kMostCompared)) return false;
+    if (!close(phi, last)) return false;
     fill(result);
     return true;
   }
@@ -265,6 +270,8 @@ class RingSearch {
                xm = view_.turn_m * mate_core(m, view_.turn_m.transpose() * -e);
     c.z = view_.axis.dot(x - view_.point);
     c.r = view_.across(x - view_.point).norm();
+    c.on_k = x - view_.point;
+    c.lone = view_.arcs && !on_arcs(c);
     c.at = {view_.axis.dot(e), view_.across(e).norm()};
     c.e = e;
     c.nk = view_.turn_k * k.normal;
@@ -291,6 +298,14 @@ class RingSearch {
     return true;
   }
 
+  bool on_arcs(const Circle& c) const {
+    const auto on = [&](const RoundEdges::Circle& edge) {
+      return std::hypot(c.r - view_.scale_k * edge.radius, c.z - view_.scale_k * edge.z) <= noise_;
+    };
+    const auto& edges = view_.arcs->edges;
+    return view_.arcs->holds(azimuth(c.on_k), 0) && std::any_of(edges.begin(), edges.end(), on);
+  }
+
   // Of the mate in its own axes: its core's support along unit `own`.
   Vec3 mate_core(const Support& on, const Vec3& own) const {
     const double left = view_.swept ? view_.scale_m * view_.swept->radius - view_.ball : -1;
@@ -298,36 +313,37 @@ class RingSearch {
     return view_.scale_m * view_.swept->points[view_.swept->support(own)] + left * own;
   }
 
-  // Circles are kept by the angle they were asked for. Chosen are those asked for in a sector, and some
-  // on either side, of a mate's points some that were asked for at azimuths near the sector's.
+  // The order of circles is that of the angles they were asked for. Chosen are those asked for in a sector,
+  // and some on either side, of a mate's points some that were asked for at azimuths near the sector's.
   void choose(const Sector& sector, double half) {
-    const auto before = [](const Circle& c, const Angle& a) { return cross(c.at, a) > 0; };
-    const Circle *const begin = circle_, *const end = circle_ + count_;
+    const auto before = [&](short c, const Angle& a) { return cross(circle_[c].at, a) > 0; };
+    const short *const begin = order_, *const end = order_ + count_;
     const auto first = static_cast<int>(std::lower_bound(begin, end, sector.low, before) - begin),
                last = static_cast<int>(std::lower_bound(begin, end, sector.high, before) - begin);
     const double reach = std::max(kNearAzimuth, 2 * half);
     const Vec3 u = outward(sector.phi);
     const auto near = [&](const Circle& c) {
-      return view_.circles || reach > 1 ||
+      return (view_.circles && !c.lone) || reach > 1 ||
              (c.e - c.at.s * u - c.at.c * view_.axis).squaredNorm() <= square(reach * c.at.s);
     };
     chosen_ = 0;
     for (int i = first - 1, beside = 0; i >= 0 && beside < kBeside; --i) {
-      const bool counts = near(circle_[i]);
-      if (counts || first - i <= kBeside) which_[chosen_++] = i;
+      const bool counts = near(circle_[order_[i]]);
+      if (counts || first - i <= kBeside) which_[chosen_++] = order_[i];
       beside += counts;
     }
-    for (int i = first; i < last; ++i) which_[chosen_++] = i;
+    for (int i = first; i < last; ++i) which_[chosen_++] = order_[i];
     for (int i = last, beside = 0; i < count_ && beside < kBeside; ++i) {
-      const bool counts = near(circle_[i]);
-      if (counts || i - last < kBeside) which_[chosen_++] = i;
+      const bool counts = near(circle_[order_[i]]);
+      if (counts || i - last < kBeside) which_[chosen_++] = order_[i];
       beside += counts;
     }
   }
   void insert(const Circle& c) {
-    int at = count_++;
-    for (; at > 0 && cross(c.at, circle_[at - 1].at) > 0; --at) circle_[at] = circle_[at - 1];
-    circle_[at] = c;
+    int at = count_;
+    for (; at > 0 && cross(c.at, circle_[order_[at - 1]].at) > 0; --at) order_[at] = order_[at - 1];
+    order_[at] = static_cast<short>(count_);
+    circle_[count_++] = c;
   }
 
   // Over the angles of a sector.
@@ -360,6 +376,16 @@ class RingSearch {
     return {sine, view_.mate_axis.cross(cross) / sine};
   }
 
+  // A circle as far as it goes: beyond the azimuths of an arc its point alone.
+  Circle known(const Circle& c, double phi, double half) const {
+    if (!view_.arcs || (!c.lone && view_.arcs->holds(phi, half))) return c;
+    Circle alone = c;
+    alone.lone = true;
+    alone.r = alone.z = 0;
+    alone.k -= c.on_k;
+    return alone;
+  }
+
   // Of the chosen circles for azimuths within `half` of the sector's.
   void project(const Sector& sector, double half) {
     const double phi = sector.phi;
@@ -367,7 +393,7 @@ class RingSearch {
     const Reach over = reach_of(sector);
     const double cosine = std::cos(half);
     for (int i = 0; i < chosen_; ++i) {
-      const Circle& c = circle_[which_[i]];
+      const Circle c = known(circle_[which_[i]], phi, half);
       const Vec3 k = view_.across(c.k);
       double reach = std::max(k.dot(left), k.dot(right));  // the most of k.u over the interval
       if (half >= M_PI) {
@@ -445,8 +471,10 @@ class RingSearch {
       range = std::max(range, std::sqrt(square(a->c - at.c) + square(a->s - at.s)));
     for (const Circle* c : {one, two}) asked = std::max(asked, apart(view_.axis, c->nk, e));
     const Mat3 to_k = view_.turn_k.transpose(), to_m = view_.turn_m.transpose();
-    double of_k =
-        view_.scale_k * meridian_bend(*view_.k, to_k * e, view_.k->revolution.axis, std::max(range, asked));
+    double of_k = 0;
+    if (!view_.arcs)
+      of_k =
+          view_.scale_k * meridian_bend(*view_.k, to_k * e, view_.k->revolution.axis, std::max(range, asked));
     of_k = std::max(0.0, of_k - view_.ball_k);
     for (Circle* c : {one, two}) {
       c->r -= of_k * view_.across(c->nk).norm();
@@ -512,7 +540,8 @@ class RingSearch {
                    f = circle.rm * turned - s * circle.k.dot(across);
       return Slope{ps * s + pc * c, ps * c - pc * s, f};
     };
-    Circle one = circle_[which_[here.from]], two = circle_[which_[here.to]];
+    Circle one = known(circle_[which_[here.from]], sector.phi, sector.half),
+           two = known(circle_[which_[here.to]], sector.phi, sector.half);
     const double round = round_off(sector, here.at, u, over, &one, &two);
     const Slope x = slope(one), y = slope(two);
     const double share = x.t * y.t < 0 ? y.t / (y.t - x.t) : x.q > y.q ? 1.0 : 0.0;
@@ -545,7 +574,9 @@ class RingSearch {
     return round + least - lost - noise_;
   }
 
-  bool close(double phi, double most_compared) {
+  bool close(double phi, bool last) {
+    const double most_compared = last ? kMostComparedLast : kMostCompared,
+                 first_spent = last ? kFirstSpentLast : kFirstSpent;
     Sector stack[kDeepestSector + 2];
     int top = 0, sectors = 0;
     double closed = 0;
@@ -554,7 +585,7 @@ class RingSearch {
     while (top > 0) {
       const double spent =
           std::max((++sectors + kCircleCost * count_) / kMostSpent, compared_ / most_compared);
-      if (spent > 1 || (spent > kFirstSpent && closed < kHopeless * spent)) return false;
+      if (spent > 1 || (spent > first_spent && closed < kHopeless * spent)) return false;
       Sector& sector = stack[top - 1];
       const double threshold = best_ - kClosedShare * tolerance_;
       const Least wide = bound(sector, sector.half, threshold);
@@ -625,7 +656,8 @@ class RingSearch {
   }
 
   void witness(const Circle& c, double phi, Vec3* on_k, Vec3* on_m) const {
-    *on_k = view_.point + c.r * outward(phi) + c.z * view_.axis + view_.ball_k * best_e_;
+    const Vec3 at = known(c, phi, 0).lone ? c.on_k : Vec3(c.r * outward(phi) + c.z * view_.axis);
+    *on_k = view_.point + at + view_.ball_k * best_e_;
     *on_m = c.middle - view_.ball * best_e_;
     if (!view_.circles) return;
     const Vec3 e = direction(c.at, phi), square = e - view_.mate_axis.dot(e) * view_.mate_axis;
@@ -643,26 +675,38 @@ class RingSearch {
   int count_ = 0, queries_ = 0;
   long compared_ = 0;  // circles, in plane hulls
   Circle circle_[kMostCircles];
+  short order_[kMostCircles];
   int chosen_ = 0, which_[kMostCircles];
   Meridian meridian_[kMostCircles];  // of the chosen
 };
+
+// About the axis of K's revolution or, if not null, of these arcs.
+bool search_about(const PairFrame& pair, bool k_is_a, const RoundEdges* arcs, double tolerance, bool last,
+                  PolytopeResult* result) {
+  const Shape &k = k_is_a ? *pair.a : *pair.b, &mate = k_is_a ? *pair.b : *pair.a;
+  const double scale = k_is_a ? pair.scale_b : pair.scale_a;
+  const bool round = PairFrame::rolling_ball(mate, scale, tolerance) > 0 && !mate.proofs.sphere;
+  // Circles of a mate about nearly the same axis serve better, unless it ends in spheres.
+  const Vec3 of_k = arcs ? arcs->axis : k.revolution.axis,
+             axis = k_is_a ? Vec3(pair.turn * mate.revolution.axis) : mate.revolution.axis,
+             own = k_is_a ? of_k : Vec3(pair.turn * of_k);
+  const bool near = mate.revolution.found && own.cross(axis).norm() < kNearAxis;
+  for (const bool core : {false, true})
+    if ((core ? round : near || !round) && RingSearch(pair, k_is_a, core, tolerance, arcs).run(last, result))
+      return true;
+  return false;
+}
 
 }  // namespace
 
 bool search_rings(const PairFrame& pair, double tolerance, bool last, PolytopeResult* result) {
   for (const bool k_is_a : {true, false}) {
     const Shape& k = k_is_a ? *pair.a : *pair.b;
-    if (!k.revolution.found || k.proofs.sphere) continue;
-    const Shape& mate = k_is_a ? *pair.b : *pair.a;
-    const double scale = k_is_a ? pair.scale_b : pair.scale_a;
-    const bool round = PairFrame::rolling_ball(mate, scale, tolerance) > 0 && !mate.proofs.sphere;
-    // Circles of a mate about nearly the same axis serve better, unless it ends in spheres.
-    const Vec3 axis = k_is_a ? Vec3(pair.turn * mate.revolution.axis) : mate.revolution.axis,
-               own = k_is_a ? k.revolution.axis : Vec3(pair.turn * k.revolution.axis);
-    const bool near = mate.revolution.found && own.cross(axis).norm() < kNearAxis;
-    for (const bool core : {false, true})
-      if ((core ? round : near || !round) && RingSearch(pair, k_is_a, core, tolerance).run(last, result))
-        return true;
+    if (k.revolution.found && !k.proofs.sphere &&
+        search_about(pair, k_is_a, nullptr, tolerance, last, result))
+      return true;
+    for (const RoundEdges& arcs : k.round_edges)
+      if (search_about(pair, k_is_a, &arcs, tolerance, last, result)) return true;
   }
   return false;
 }

@@ -188,6 +188,7 @@ constexpr double kNearer2 = 1e-3;  // squared offset across the normals over wha
                                    // more was none of Newton's, which squares it (next to poles)
 constexpr double kNoTurn = kRoundoff * kRoundoff;  // rad^2: of a normal in a step
 constexpr double kNormalTrust = 0.3;  // relative change of a tangent beyond which a step's normal is not used
+constexpr double kBeyondPatch = 1e-6;  // in its parameters, that a step may lead
 constexpr double kNearPole =
     1e-4;  // ratio of the tangents' lengths below which a plane's warm solve hands on
 constexpr int kWarmIterations = 4;      // 1 or 2 are usual
