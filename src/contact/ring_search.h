@@ -7,8 +7,8 @@
 namespace nurbs {
 
 // Improves `result`, the polytope's answer for overlapping bodies of which A or B is one of revolution about
-// an axis: bracket and, where it closes, points and normal. True when the bracket is closed. `last`: the
-// polytope did not close it; rings may be less alike then.
+// an axis or has edges that are: bracket and, where it closes, points and normal. True when the bracket is
+// closed. `last`: the polytope did not close it; rings may be less alike then.
 //
 // With e = d (or -d, for B) at azimuth phi and angle alpha from the axis of K, the body of revolution,
 // p >= r_K |e - (e.a) a| + z_K e.a - e.(o + x) for every circle (r_K, z_K) of K about its axis a and point x
@@ -19,7 +19,9 @@ namespace nurbs {
 // the axes are apart, or two circles are weighed to second order, in which what they change by cancels at the
 // minimum; intervals, and those of angles from the axis, are halved until that is little enough. No surface
 // is evaluated for it but where a new circle is needed. Between two circles a body bends as its meridian does
-// (body/profile_radii.h). A ball is of revolution about any axis: K's is taken.
+// (body/profile_radii.h). A ball is of revolution about any axis: K's is taken. Of a body with sharp edges
+// round an axis for part of a turn (body/round_edges.h) supports on them are circles for the azimuths that
+// they reach, and points beyond; its other supports are points.
 bool search_rings(const PairFrame& pair, double tolerance, bool last, PolytopeResult* result);
 
 }  // namespace nurbs
