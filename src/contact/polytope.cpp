@@ -729,21 +729,18 @@ class Search {
   // there belongs to neither body: where the supports do not face each other, as on ruled lines, it is made
   // again without.
   void find_witness(Vec3* a, Vec3* b) {
-    int near;
-    if (find_nearest_pair(a, b, &near) <= kFacing * pair_.size || caps_ == 0) return;
+    if (find_nearest_pair(a, b).off <= kFacing * pair_.size || caps_ == 0) return;
     for (int k = 0; k < caps_; ++k) give_back(cap_[k]);
     caps_ = 0;
     Vec3 across;
     if (start_from_points(0, &across)) refine_pair(a, b);
   }
   void refine_pair(Vec3* a, Vec3* b) {
-    int near;
     for (int k = 0; k < kMostFacing; ++k) {
-      const double off = find_nearest_pair(a, b, &near);
-      if (off <= std::max(tolerance_, roundoff()) || near < 0) return;
-      const Vec3 towards = target() - (*a - *b);
-      const int v = query(towards.normalized(), closest_of(hull_.face(near), direction_));
-      if (v < 0 || hull_.grow(v, 0.0, near) != GrowingHull::Growth::grown) return;
+      const Facing near = find_nearest_pair(a, b);
+      if (near.off <= std::max(tolerance_, roundoff()) || near.face < 0) return;
+      const int v = query(near.towards.normalized(), closest_of(hull_.face(near.face), direction_));
+      if (v < 0 || hull_.grow(v, 0.0, near.face) != GrowingHull::Growth::grown) return;
     }
   }
   void give_back(const Cap& cap) {
@@ -751,13 +748,19 @@ class Search {
     witness_[cap.vertex] = witness_[cap.from];
   }
 
-  // How far the pair of witnesses is from the target; *near: the triangle they come from, or -1.
-  double find_nearest_pair(Vec3* a, Vec3* b, int* near) const {
+  // How far the pair of witnesses is from the target; the triangle nearest to that and the way there from it.
+  struct Facing {
+    double off;
+    int face = -1;
+    Vec3 towards = Vec3::Zero();
+  };
+  Facing find_nearest_pair(Vec3* a, Vec3* b) const {
     const Vec3 target = this->target();
     *a = witness_[best_].a;
     *b = witness_[best_].b;
-    *near = -1;
-    double best = (*a - *b - target).squaredNorm();
+    Facing near{(*a - *b - target).norm()};
+    double best = kFarAway;
+    Vec3 weights;
     for (int k = 0; k < hull_.faces(); ++k) {
       const GrowingHull::Face& f = hull_.face(k);
       if (!f.alive) continue;
@@ -766,17 +769,23 @@ class Search {
       if (std::any_of(f.vertex.begin(), f.vertex.end(), [&](short v) { return witness_[v].cap; })) continue;
       const Vec3 &p = hull_.point(f.vertex[0]), &q = hull_.point(f.vertex[1]), &r = hull_.point(f.vertex[2]);
       const Vec3 w = nearest_on_triangle(p - target, q - target, r - target);
-      const double distance = (w[0] * p + w[1] * q + w[2] * r - target).squaredNorm();
+      const Vec3 towards = target - (w[0] * p + w[1] * q + w[2] * r);
+      const double distance = towards.squaredNorm();
       if (!(distance < best)) continue;
       best = distance;
-      *near = k;
-      *a = *b = Vec3::Zero();
-      for (int i = 0; i < 3; ++i) {
-        *a += w[i] * witness_[f.vertex[i]].a;
-        *b += w[i] * witness_[f.vertex[i]].b;
-      }
+      near.face = k;
+      near.towards = towards;
+      weights = w;
     }
-    return std::sqrt(best);
+    if (near.face < 0 || !(std::sqrt(best) < near.off)) return near;
+    near.off = std::sqrt(best);
+    *a = *b = Vec3::Zero();
+    for (int i = 0; i < 3; ++i) {
+      const Witness& w = witness_[hull_.face(near.face).vertex[i]];
+      *a += weights[i] * w.a;
+      *b += weights[i] * w.b;
+    }
+    return near;
   }
 
   const PairFrame& pair_;
@@ -811,10 +820,12 @@ bool is_polar(const PairFrame& pair, const Vec3& d) {
 // Rings and cells know few points of the bodies, which may not face each other where it takes three or four
 // to carry the contact.
 __attribute__((noinline)) void make_points_face(const PairFrame& pair, double tolerance, PolytopeResult* r) {
-  const Vec3 apart = r->points.b - r->points.a;
-  if (!(apart.cross(r->bracket.direction).norm() > kFacing * pair.size)) return;
+  const auto off = [](const PolytopeResult& x) {
+    return (x.points.b - x.points.a).cross(x.bracket.direction).norm();
+  };
+  if (!(off(*r) > kFacing * pair.size)) return;
   PolytopeResult better = *r;
-  if (Search(pair, tolerance, 0.0, false).find_points(&better)) *r = better;
+  if (Search(pair, tolerance, 0.0, false).find_points(&better) && off(better) < off(*r)) *r = better;
 }
 
 bool has_rings(const Shape& shape) {

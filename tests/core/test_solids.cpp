@@ -407,7 +407,7 @@ double outside(const Particle& p, const Vec3& point) {
 // along ruled lines, beyond their ends or too far for second order.
 TEST(SavedCases, contact_points_lie_on_the_bodies) {
   for (const char* file : {"bullet-twins.json", "pillow-in-paraboloid-cap.json",
-                           "cylinders-side-by-side.json", "pillow-twins.json"}) {
+                           "cylinders-side-by-side.json", "pillow-twins.json", "double-cone-twins.json"}) {
     const PairCase pair = read_pair_case(std::string("tests/cases/") + file);
     pair.a.shape->inner_map();
     pair.b.shape->inner_map();
