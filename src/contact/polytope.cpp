@@ -53,10 +53,11 @@ constexpr double kFlatBend = 1e-3;        // of the overlap, of its bend along a
 constexpr double kCapDepth = 0.4;         // of the tolerance, that a cap proves less than the least overlap
 constexpr double kCapUsed = 0.8;          // of a cap's angle: the rest is for lower minima found later
 constexpr double kWidestCap = 0.42, kLeastCap = 1e-4, kNextCap = 0.75;  // rad
-constexpr double kPlaneBeyond = 4;   // times the least distance, squared: no triangle in it is nearer
-constexpr double kFacing = 1e-6;     // of the smaller body: witnesses may be off each other by
-constexpr int kMostFacing = 96;      // points spent on better ones
-constexpr double kOffNormal = 1e-6;  // rad, given away for round-off
+constexpr double kPlaneBeyond = 4;    // times the least distance, squared: no triangle in it is nearer
+constexpr double kFacing = 1e-6;      // of the smaller body: witnesses may be off each other by
+constexpr double kFacingShare = 0.1;  // of the tolerance, that better ones are to be off
+constexpr int kMostFacing = 96;       // points spent on better ones
+constexpr double kOffNormal = 1e-6;   // rad, given away for round-off
 // A cap whose bodies are cut to their cores about it, below.
 constexpr double kOffSupport = 1e-4;  // rad
 constexpr int kBeforeCores = 96;      // points before that is tried ...
@@ -257,8 +258,9 @@ class Search {
     r.points.na = direction_;
     r.points.nb = -direction_;
     const Witness& w = witness_[best_];
-    r.points.a = a + shrink_a_ * direction_;
-    r.points.b = b - shrink_b_ * direction_;
+    // Onto the planes of the supports: means of others lie a little inside.
+    r.points.a = a + (direction_.dot(w.a - a) + shrink_a_) * direction_;
+    r.points.b = b + (direction_.dot(w.b - b) - shrink_b_) * direction_;
     r.points.on_a = surface_place(*pair_.a, w.on_a, direction_);
     r.points.on_b = surface_place(*pair_.b, w.on_b, pair_.direction_on_b(direction_));
     const double apart = direction_.dot(r.points.b - r.points.a);
@@ -738,7 +740,7 @@ class Search {
   void refine_pair(Vec3* a, Vec3* b) {
     for (int k = 0; k < kMostFacing; ++k) {
       const Facing near = find_nearest_pair(a, b);
-      if (near.off <= std::max(tolerance_, roundoff()) || near.face < 0) return;
+      if (near.off <= std::max(kFacingShare * tolerance_, roundoff()) || near.face < 0) return;
       const int v = query(near.towards.normalized(), closest_of(hull_.face(near.face), direction_));
       if (v < 0 || hull_.grow(v, 0.0, near.face) != GrowingHull::Growth::grown) return;
     }
