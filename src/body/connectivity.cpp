@@ -24,17 +24,10 @@ Vec3 edge_point(const BezierPatch& patch, int edge, double t) {
 }
 
 bool is_collapsed(const BezierPatch& patch, int edge, double tolerance) {
-  const int n = edge < 2 ? patch.degree_v : patch.degree_u;
-  Vec3 first = Vec3::Zero();
-  for (int k = 0; k <= n; ++k) {
-    const int i = edge < 2 ? (edge == 0 ? 0 : patch.degree_u) : k;
-    const int j = edge < 2 ? k : (edge == 2 ? 0 : patch.degree_v);
-    const Vec4& h = patch.point(i, j);
-    const Vec3 x = h.head<3>() / h[3];
-    if (k == 0) first = x;
-    if ((x - first).norm() > tolerance) return false;
-  }
-  return true;
+  const std::vector<Vec4> net = edge_net(patch, edge);
+  const Vec3 first = net[0].head<3>() / net[0][3];
+  return std::none_of(net.begin(), net.end(),
+                      [&](const Vec4& h) { return (h.head<3>() / h[3] - first).norm() > tolerance; });
 }
 
 Edge make_edge(const BezierPatch& patch, int index, int edge, double tolerance) {
@@ -332,6 +325,15 @@ int boundary_sense(int edge) {
 
 double projected_parameter(const BezierPatch& partner, const EdgeLink& link, const Vec3& x) {
   return refine_closest(partner, link.edge, x, closest_parameter(partner, link.edge, x));
+}
+
+std::vector<Vec4> edge_net(const BezierPatch& patch, int edge) {
+  std::vector<Vec4> net;
+  const int last = edge < 2 ? patch.degree_v : patch.degree_u;
+  for (int k = 0; k <= last; ++k)
+    net.push_back(edge < 2 ? patch.point(edge == 0 ? 0 : patch.degree_u, k)
+                           : patch.point(k, edge == 2 ? 0 : patch.degree_v));
+  return net;
 }
 
 UnmatchedEdge connect_patches(const std::vector<BezierPatch>& patches, double tolerance, PatchLinks& links) {

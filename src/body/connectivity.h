@@ -18,6 +18,21 @@ inline Vec2 edge_parameters(int edge, double t) {
   return edge < 2 ? Vec2(end, t) : Vec2(t, end);
 }
 
+// Control points of an edge, homogeneous, in the order of its parameter.
+std::vector<Vec4> edge_net(const BezierPatch& patch, int edge);
+
+// Calls visit(patch, edge) once for every joint that opens to a sharp edge, of the side that comes first.
+template <class Visit>
+void visit_creases(const PatchLinks& links, const Visit& visit) {
+  for (int p = 0; p < static_cast<int>(links.size()); ++p)
+    for (int e = 0; e < 4; ++e) {
+      const EdgeLink& link = links[p][e];
+      if (link.patch < 0 || link.collapsed || !(link.kink > kSmoothKink)) continue;
+      if (link.patch < p || (link.patch == p && link.edge < e)) continue;
+      visit(p, e);
+    }
+}
+
 // The other end of a link: the parameter `t` of an edge as counted on its partner. Two rational curves that
 // are the same curve differ by such a map, unless one runs through it twice (or is straight): those links are
 // `projected`, and this is a guess.

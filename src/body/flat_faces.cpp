@@ -63,11 +63,7 @@ struct BoundaryCurve {
 // Control points of a patch's edge.
 std::vector<Vec3> edge_points(const BezierPatch& patch, int edge) {
   std::vector<Vec3> points;
-  for (int k = 0; k <= (edge < 2 ? patch.degree_v : patch.degree_u); ++k) {
-    const int i = edge < 2 ? (edge == 0 ? 0 : patch.degree_u) : k;
-    const int j = edge < 2 ? k : (edge == 2 ? 0 : patch.degree_v);
-    points.push_back(control_point(patch.point(i, j)));
-  }
+  for (const Vec4& p : edge_net(patch, edge)) points.push_back(control_point(p));
   return points;
 }
 
@@ -294,16 +290,12 @@ class Finder {
 
   void find_edges() {
     std::vector<std::vector<Vec3>> creases;
-    for (int p = 0; p < static_cast<int>(shape_.patches.size()); ++p)
-      for (int e = 0; e < 4; ++e) {
-        const EdgeLink& link = shape_.links[p][e];
-        if (link.patch < 0 || link.collapsed || !(link.kink > kSmoothKink)) continue;
-        if (link.patch < p || (link.patch == p && link.edge < e)) continue;
-        if (!is_straight(shape_.patches[p], e, tolerance_)) continue;
-        const BoundaryCurve curve{&shape_.patches[p], e, true};
-        add_edge(curve.point(0), curve.point(1));
-        creases.push_back(edge_points(shape_.patches[p], e));
-      }
+    visit_creases(shape_.links, [&](int p, int e) {
+      if (!is_straight(shape_.patches[p], e, tolerance_)) return;
+      const BoundaryCurve curve{&shape_.patches[p], e, true};
+      add_edge(curve.point(0), curve.point(1));
+      creases.push_back(edge_points(shape_.patches[p], e));
+    });
     for (StraightEdge& edge : out_.edges)
       for (const std::vector<Vec3>& points : creases)
         edge.slack = std::max(edge.slack, slack_of(points, edge));

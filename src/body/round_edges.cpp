@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "body/connectivity.h"
 #include "body/shape.h"
 #include "nurbs/tolerances.h"
 
@@ -19,15 +20,6 @@ constexpr int kMostEdges = 64;  // a body with more is left alone
 
 using Curve = std::vector<Vec4>;  // homogeneous control points
 
-Curve edge_curve(const BezierPatch& patch, int edge) {
-  Curve curve;
-  const int last = edge < 2 ? patch.degree_v : patch.degree_u;
-  for (int k = 0; k <= last; ++k)
-    curve.push_back(edge < 2 ? patch.point(edge == 0 ? 0 : patch.degree_u, k)
-                             : patch.point(k, edge == 2 ? 0 : patch.degree_v));
-  return curve;
-}
-
 // As one of lower degree, down to 2, while it is one (NURBS Book, section 5.6).
 Curve reduced(Curve curve, double size) {
   for (int n = static_cast<int>(curve.size()) - 1; n > 2; --n) {
@@ -40,19 +32,6 @@ Curve reduced(Curve curve, double size) {
     curve = lower;
   }
   return curve;
-}
-
-Vec3 at(const RoundEdges& e, double azimuth) {
-  const RoundEdges::Circle& c = e.edges[0];
-  return e.point + c.z * e.axis +
-         c.radius * (std::cos(azimuth) * e.start + std::sin(azimuth) * e.axis.cross(e.start));
-}
-double azimuth_of(const RoundEdges& e, const Vec3& x) {
-  return std::atan2(e.axis.cross(e.start).dot(x - e.point), e.start.dot(x - e.point));
-}
-// By full turns to `from` or above, but for round-off.
-double beyond(double angle, double from) {
-  return angle - 2 * M_PI * std::floor((angle - from + kSameAngle) / (2 * M_PI));
 }
 
 // A rational quadratic of middle weight w, in standard form, is a circle's arc of half the angle acos w where
@@ -79,47 +58,58 @@ bool find_circle(const Curve& c, double size, RoundEdges* out) {
   return true;
 }
 
-// Whether b goes on where a ends, on the same circle.
+bool same_azimuth(const Vec3& x, const Vec3& y) {
+  return (x - y).norm() <= kSameAngle;
+}
+// Where b begins and ends, as a's azimuths run.
+Vec3 begin_of(const RoundEdges& b, const RoundEdges& a) {
+  return b.outward(a.axis.dot(b.axis) < 0 ? b.to : b.from);
+}
+Vec3 end_of(const RoundEdges& b, const RoundEdges& a) {
+  return b.outward(a.axis.dot(b.axis) < 0 ? b.from : b.to);
+}
+
+// Whether a and b are parts of one circle that meet; a then is both.
 bool join(RoundEdges* a, const RoundEdges& b, double size) {
-  const bool against = a->axis.dot(b.axis) < 0;
   const double radius = a->edges[0].radius, tilt = a->axis.cross(b.axis).norm(),
                off = (a->point - b.point).norm() + std::abs(radius - b.edges[0].radius) + radius * tilt;
   if (a->whole() || !(off <= kSame * size)) return false;
-  const double first = azimuth_of(*a, at(b, against ? b.to : b.from));
-  if (!(beyond(first, a->to) - a->to <= kSameAngle)) return false;
-  a->to += b.to - b.from;
+  if (same_azimuth(a->outward(a->to), begin_of(b, *a)))
+    a->to += b.to - b.from;
+  else if (same_azimuth(a->outward(a->from), end_of(b, *a)))
+    a->from -= b.to - b.from;
+  else
+    return false;
   a->error = std::max(a->error, b.error + off);
   if (a->to - a->from > 2 * M_PI - kSameAngle) a->to = a->from + 2 * M_PI;
   return true;
 }
 
-// Whether b's circles have a's axis and azimuths, and go with them.
+// Whether b's circle has a's axis and azimuths, and goes with a's.
 bool group(RoundEdges* a, const RoundEdges& b, double size) {
   const Vec3 apart = b.point - a->point;
   const double z = a->axis.dot(apart), radius = b.edges[0].radius,
                off = (apart - z * a->axis).norm() + radius * a->axis.cross(b.axis).norm();
-  if (!(off <= kSame * size)) return false;
-  const bool against = a->axis.dot(b.axis) < 0;
-  if (a->whole() != b.whole()) return false;
-  if (!a->whole()) {
-    const double first = beyond(azimuth_of(*a, at(b, against ? b.to : b.from)), a->from);
-    if (!(first - a->from <= kSameAngle && std::abs(b.to - b.from - (a->to - a->from)) <= kSameAngle))
-      return false;
-  }
+  if (!(off <= kSame * size) || a->whole() != b.whole()) return false;
+  if (!a->whole() && !(same_azimuth(a->outward(a->from), begin_of(b, *a)) &&
+                       std::abs(b.to - b.from - (a->to - a->from)) <= kSameAngle))
+    return false;
   a->edges.push_back({radius, z});
   a->error = std::max(a->error, b.error + off);
   return true;
 }
 
-template <class Merge>
-void merge(std::vector<RoundEdges>* all, const Merge& merged) {
-  for (size_t i = 0; i < all->size(); ++i)
-    for (size_t j = 0; j < all->size(); ++j)
-      if (i != j && merged(&(*all)[i], (*all)[j])) {
-        all->erase(all->begin() + static_cast<std::ptrdiff_t>(j));
-        if (j < i) --i;
-        j = static_cast<size_t>(-1);  // what has grown may go on elsewhere
-      }
+// Each taken by the first that does, over and over until none is.
+template <class Take>
+void merge(std::vector<RoundEdges>* all, const Take& take) {
+  for (size_t before = all->size() + 1; all->size() < before;) {
+    before = all->size();
+    std::vector<RoundEdges> kept;
+    for (const RoundEdges& e : *all)
+      if (std::none_of(kept.begin(), kept.end(), [&](RoundEdges& other) { return take(&other, e); }))
+        kept.push_back(e);
+    *all = std::move(kept);
+  }
 }
 
 }  // namespace
@@ -127,16 +117,12 @@ void merge(std::vector<RoundEdges>* all, const Merge& merged) {
 std::vector<RoundEdges> find_round_edges(const Shape& shape) {
   const double size = shape.bounding_radius;
   std::vector<RoundEdges> all;
-  for (int p = 0; p < static_cast<int>(shape.patches.size()); ++p)
-    for (int e = 0; e < 4; ++e) {
-      const EdgeLink& link = shape.links[p][e];
-      const bool seen = link.patch < p || (link.patch == p && link.edge < e);
-      if (link.collapsed || seen || !(link.kink > kSmoothKink)) continue;
-      const Curve curve = reduced(edge_curve(shape.patches[p], e), size);
-      RoundEdges found;
-      if (curve.size() == 3 && find_circle(curve, size, &found)) all.push_back(found);
-      if (all.size() > kMostEdges) return {};
-    }
+  visit_creases(shape.links, [&](int patch, int edge) {
+    const Curve curve = reduced(edge_net(shape.patches[patch], edge), size);
+    RoundEdges found;
+    if (curve.size() == 3 && find_circle(curve, size, &found)) all.push_back(found);
+  });
+  if (all.size() > kMostEdges) return {};
   merge(&all, [&](RoundEdges* a, const RoundEdges& b) { return join(a, b, size); });
   merge(&all, [&](RoundEdges* a, const RoundEdges& b) { return group(a, b, size); });
   for (RoundEdges& e : all) e.error += kError * size;

@@ -22,6 +22,9 @@ struct RoundEdges {
   std::vector<Circle> edges;  // that lie on the body, but for `error`
   double error = 0;
 
+  Vec3 outward(double azimuth) const {
+    return std::cos(azimuth) * start + std::sin(azimuth) * axis.cross(start);
+  }
   bool whole() const { return to - from >= 2 * M_PI; }
   // Whether all azimuths within `half` of one are the arcs'.
   bool holds(double azimuth, double half) const {

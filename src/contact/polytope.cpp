@@ -267,9 +267,7 @@ class Search {
     // Where the bracket stayed open, the least overlap seen: the hull errs to first order, the direction to
     // second.
     r.gap = r.converged ? std::clamp(apart, r.bracket.lower, r.bracket.upper) : r.bracket.lower;
-    // The hull lies inside the obstacle, by less than the witnesses are known sideways.
-    r.points.a += 0.5 * (apart - r.gap) * direction_;
-    r.points.b -= 0.5 * (apart - r.gap) * direction_;
+    part_points(&r);
     return r;
   }
 
@@ -542,15 +540,12 @@ class Search {
   void lower_caps() {
     lower_caps_ = false;
     const double level = -lower_ - kCapDepth * tolerance_ - shrink_;
+    if (!(level > tolerance_)) drop_caps();
     for (int k = 0; k < caps_; ++k) {
       Cap& cap = cap_[k];
       cap.level = std::min(cap.level, level);
-      if (level > tolerance_)
-        hull_.move(cap.vertex, cap.level / cap.used * cap.d);
-      else
-        give_back(cap);
+      hull_.move(cap.vertex, cap.level / cap.used * cap.d);
     }
-    if (!(level > tolerance_)) caps_ = 0;
     Vec3 across;
     if (!start_from_points(0, &across)) stalled_ = true;
   }
@@ -732,8 +727,7 @@ class Search {
   // again without.
   void find_witness(Vec3* a, Vec3* b) {
     if (find_nearest_pair(a, b).off <= kFacing * pair_.size || caps_ == 0) return;
-    for (int k = 0; k < caps_; ++k) give_back(cap_[k]);
-    caps_ = 0;
+    drop_caps();
     Vec3 across;
     if (start_from_points(0, &across)) refine_pair(a, b);
   }
@@ -745,9 +739,13 @@ class Search {
       if (v < 0 || hull_.grow(v, 0.0, near.face) != GrowingHull::Growth::grown) return;
     }
   }
-  void give_back(const Cap& cap) {
-    hull_.move(cap.vertex, hull_.point(cap.from));
-    witness_[cap.vertex] = witness_[cap.from];
+  // Their points become their minima's own; the surface has to be started again.
+  void drop_caps() {
+    for (int k = 0; k < caps_; ++k) {
+      hull_.move(cap_[k].vertex, hull_.point(cap_[k].from));
+      witness_[cap_[k].vertex] = witness_[cap_[k].from];
+    }
+    caps_ = 0;
   }
 
   // How far the pair of witnesses is from the target; the triangle nearest to that and the way there from it.

@@ -13,10 +13,10 @@ constexpr double kMostSpent = 2400;        // sectors bounded, some 0.3 us each,
 constexpr double kMostCompared = 1e6;      // circles in their hulls, 2 ns each
 constexpr double kMostComparedLast = 4e6;  // ... where nothing else did
 constexpr double kFirstSpent = 0.25;       // of either, after which it ends ...
-constexpr double kFirstSpentLast = 0.375;
-constexpr double kHopeless = 0.1;       // ... where less than this times its share of all is closed
-constexpr int kDeepestSector = 60;      // halvings of the azimuth
-constexpr double kNearAxis = 0.2;       // sine between the axes up to which both bodies' circles are used
+constexpr double kFirstSpentLast = 0.375;  // ... and where nothing else did
+constexpr double kHopeless = 0.1;          // ... where less than this times its share of all is closed
+constexpr int kDeepestSector = 60;         // halvings of the azimuth
+constexpr double kNearAxis = 0.2;          // sine between the axes up to which both bodies' circles are used
 constexpr double kNearlyAlike = 0.1;    // of the body's radius: what directions of a ring may differ by ...
 constexpr double kHardlyAlike = 0.4;    // ... where nothing else did
 constexpr double kClosedShare = 0.9;    // of the tolerance at which a sector is closed ...
@@ -268,9 +268,9 @@ class RingSearch {
     Circle c;
     const Vec3 x = view_.turn_k * (view_.scale_k * k.point - view_.ball_k * k.normal),
                xm = view_.turn_m * mate_core(m, view_.turn_m.transpose() * -e);
-    c.z = view_.axis.dot(x - view_.point);
-    c.r = view_.across(x - view_.point).norm();
     c.on_k = x - view_.point;
+    c.z = view_.axis.dot(c.on_k);
+    c.r = view_.across(c.on_k).norm();
     c.lone = view_.arcs && !on_arcs(c);
     c.at = {view_.axis.dot(e), view_.across(e).norm()};
     c.e = e;

@@ -15,11 +15,6 @@ namespace {
 using test::Random;
 using test::Solid;
 
-Vec3 point_at(const RoundEdges& e, const RoundEdges::Circle& c, double azimuth) {
-  return e.point + c.z * e.axis +
-         c.radius * (std::cos(azimuth) * e.start + std::sin(azimuth) * e.axis.cross(e.start));
-}
-
 // No point of an arc is outside the body, and all touch it from inside: along the arc's own outward direction
 // or tilted from it, some support is there.
 void expect_on_body(const Shape& shape, const RoundEdges& e) {
@@ -28,8 +23,8 @@ void expect_on_body(const Shape& shape, const RoundEdges& e) {
   EXPECT_LT(e.error, 1e-12);
   for (const RoundEdges::Circle& c : e.edges)
     for (int k = 0; k <= 40; ++k) {
-      const Vec3 x = point_at(e, c, e.from + (e.to - e.from) * k / 40);
-      const Vec3 out = (x - e.point - c.z * e.axis).normalized();
+      const Vec3 out = e.outward(e.from + (e.to - e.from) * k / 40);
+      const Vec3 x = e.point + c.z * e.axis + c.radius * out;
       double off = 1e300;
       for (int i = -20; i <= 20; ++i) {
         const double tilt = 0.0785 * i;
