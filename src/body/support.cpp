@@ -14,7 +14,8 @@
 namespace nurbs {
 namespace {
 
-constexpr double kFanSafety = 1.1;  // sines of slopes stand for angles
+constexpr double kFanSafety = 1.1;   // sines of slopes stand for angles
+constexpr double kUsualRadius = 4e3;  // of curvature, over the bounding radius: few surfaces are flatter
 
 // The end of edge `edge` in patch parameters, and which parameter is pinned on it.
 bool pins_u(int edge) {
@@ -254,8 +255,8 @@ Normal set_point(const Shape& shape, const Vec3& d, const SurfacePoint& at, Supp
   return set_point(shape, d, at, jet.s, jet.su, jet.sv, s);
 }
 
-// Ascent from `at` to a local maximum of d . s.
-Support climb(const Shape& shape, const Vec3& d, SurfacePoint at) {
+// Ascent from `at` to a local maximum of d . s; inside of a patch to a slope of `flat`.
+Support climb(const Shape& shape, const Vec3& d, SurfacePoint at, double flat = kSlopeTolerance) {
   Support best;
   const double size = shape.bounding_radius;
   const double least_gain = kRoundoff * size;
@@ -282,7 +283,7 @@ Support climb(const Shape& shape, const Vec3& d, SurfacePoint at) {
     if (moved) continue;
     const Step step = inward_step(model, size, at, !(closed & 3u), !(closed & 12u));
     slope = step.slope;
-    if (step.length <= kStepTolerance * size || step.slope <= kSlopeTolerance) {
+    if (step.length <= kStepTolerance * size || step.slope <= (closed ? kSlopeTolerance : flat)) {
       best.converged = true;
       break;
     }
@@ -367,9 +368,9 @@ const SurfacePoint* if_on_body(const Shape& shape, const SurfacePoint* start) {
 
 // From the start, or from the atlas. Bodies of bilinear patches have their support at a corner: nothing to
 // climb.
-Support begin(const Shape& shape, const Vec3& d, const SurfacePoint* start) {
+Support begin(const Shape& shape, const Vec3& d, const SurfacePoint* start, double flat = kSlopeTolerance) {
   const SurfacePoint at = start ? *start : shape.atlas.where[shape.atlas.nearest(d)];
-  if (!shape.bilinear) return climb(shape, d, at);
+  if (!shape.bilinear) return climb(shape, d, at, flat);
   Support s;
   s.where = at;
   s.normal = d;
@@ -411,7 +412,12 @@ Support find_support(const Shape& shape, const Vec3& d, const SurfacePoint* star
 Support find_hull_support(const Shape& shape, const Vec3& d, const SurfacePoint* start, double enough) {
   start = if_on_body(shape, start);
   if (Support s; find_on_meridian(shape, d, start, &s)) return s;
-  const Support local = begin(shape, d, start);
+  // A slope s leaves r s^2 / 2 of the support where the surface's radius is r. Where that is more than usual,
+  // the ascent goes on.
+  const double flat = std::max(kSlopeTolerance, std::sqrt(enough / (kUsualRadius * shape.bounding_radius)));
+  Support local = begin(shape, d, start, flat);
+  if (!is_certain(shape, local, enough) && local.slope > kSlopeTolerance && std::isfinite(local.upper))
+    local = climb(shape, d, local.where);
   return is_certain(shape, local, enough) ? local : search_patches(shape, d, local, cell_of(shape, d));
 }
 

@@ -23,6 +23,7 @@ namespace {
 constexpr double kGuessAbove = 0.1;    // of the smaller radius: a guess that much above the lowest is none
 constexpr double kSameGuess = 0.9995;  // cosine between refined guesses: the atlases tell no more apart
 constexpr double kOnFeature = 0.97;    // cosine between a direction and its support's normal: less on an edge
+constexpr double kRoughSupport = 1e-5;  // of the body, that the supports Newton begins from may lack
 constexpr double kNearlyClosed = 100;  // tolerances
 constexpr double kOffSurface = 1e-7;   // of the body: polished points may be
 constexpr double kNormalShare = 0.5;   // of the tolerance, by which the overlap along a normal may exceed it
@@ -200,9 +201,9 @@ class Ladder {
               int* spent) const {
     ++*spent;
     const Vec3 on_b = pair.direction_on_b(guess.d);
-    const Support a = find_hull_support(*pair.a, guess.d);
+    const Support a = find_hull_support(*pair.a, guess.d, nullptr, kRoughSupport * pair.a->bounding_radius);
     if (a.normal.dot(guess.d) < kOnFeature) return false;
-    const Support b = find_hull_support(*pair.b, on_b);
+    const Support b = find_hull_support(*pair.b, on_b, nullptr, kRoughSupport * pair.b->bounding_radius);
     if (b.normal.dot(on_b) < kOnFeature) return false;
     *joint = solve_joint(pair, a.where, b.where, tolerance, settings_.reach, kPolishIterations);
     if (!joint->converged) confirm(pair, tolerance, *joint);
