@@ -39,10 +39,10 @@ NURBS_INLINE void put(const Mat3& value, int lane, Turn<Real>* x) {
   for (int k = 0; k < 3; ++k) put(Vec3(value.row(k)), lane, &x->row[k]);
 }
 
-// Coordinates of a vector and a weight.
+// Coordinates of a vector and a weight; side by side in one register, as GCC 12 takes them to be.
 template <class Real>
 struct Point {
-  Real at[4];
+  alignas(4 * sizeof(double)) alignas(Real) Real at[4];
 };
 // A net of at most kMaxDegree + 1 rows, v fastest.
 template <class Real>

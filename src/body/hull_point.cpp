@@ -77,7 +77,7 @@ bool HullPoints::on_meridian(const Vec3& d, const HullPlace* start, HullPoint* f
 
 HullPoint HullPoints::on_patches(const Vec3& d, const HullPlace* start) const {
   const bool known = start && start->on_surface.patch >= 0;
-  const Support s = find_hull_support(shape_, d, known ? &start->on_surface : nullptr, enough_);
+  const Support s = find_hull_support(shape_, d, known ? &start->on_surface : nullptr, enough_, kHullSlope);
   return {s.point, s.normal, s.upper, {{}, s.where}};
 }
 

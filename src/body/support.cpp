@@ -14,8 +14,7 @@
 namespace nurbs {
 namespace {
 
-constexpr double kFanSafety = 1.1;   // sines of slopes stand for angles
-constexpr double kUsualRadius = 4e3;  // of curvature, over the bounding radius: few surfaces are flatter
+constexpr double kFanSafety = 1.1;  // sines of slopes stand for angles
 
 // The end of edge `edge` in patch parameters, and which parameter is pinned on it.
 bool pins_u(int edge) {
@@ -409,12 +408,10 @@ Support find_support(const Shape& shape, const Vec3& d, const SurfacePoint* star
   return search_patches(shape, d, local, cell_of(shape, d));
 }
 
-Support find_hull_support(const Shape& shape, const Vec3& d, const SurfacePoint* start, double enough) {
+Support find_hull_support(const Shape& shape, const Vec3& d, const SurfacePoint* start, double enough,
+                          double flat) {
   start = if_on_body(shape, start);
   if (Support s; find_on_meridian(shape, d, start, &s)) return s;
-  // A slope s leaves r s^2 / 2 of the support where the surface's radius is r. Where that is more than usual,
-  // the ascent goes on.
-  const double flat = std::max(kSlopeTolerance, std::sqrt(enough / (kUsualRadius * shape.bounding_radius)));
   Support local = begin(shape, d, start, flat);
   if (!is_certain(shape, local, enough) && local.slope > kSlopeTolerance && std::isfinite(local.upper))
     local = climb(shape, d, local.where);

@@ -4,6 +4,7 @@
 #include <limits>
 
 #include "body/shape.h"
+#include "nurbs/tolerances.h"
 #include "nurbs/types.h"
 
 namespace nurbs {
@@ -27,10 +28,12 @@ struct Support {
 Support find_support(const Shape& shape, const Vec3& d, const SurfacePoint* start = nullptr);
 
 // The support of the body's convex hull, whatever its patches look like. h and upper differ by `enough` at
-// most, a length, or by a few ulp of the bounding radius. 0.1 to 0.5 us by the meridian or where Newton's end
-// is proven to be the support, some us where the patches have to be searched (patch_maximum.h).
+// most, a length, or by a few ulp of the bounding radius. Inside of a patch Newton may end at a slope of
+// `flat`, rad: the point is then as far from the support's, over the radius of curvature, and its height
+// lacks the square of that. 0.1 to 0.5 us by the meridian or where Newton's end is proven to be the support,
+// some us where the patches have to be searched (patch_maximum.h).
 Support find_hull_support(const Shape& shape, const Vec3& d, const SurfacePoint* start = nullptr,
-                          double enough = 0);
+                          double enough = 0, double flat = kSlopeTolerance);
 
 // The same from every patch, knowing no more than the height of one point: slow, for tables and tests.
 Support search_all_patches(const Shape& shape, const Vec3& d, const SurfacePoint& at);

@@ -3,7 +3,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 #include <utility>
+
+#include "nurbs/lanes.h"
 
 namespace nurbs {
 namespace {
@@ -12,14 +15,25 @@ int count_positive(const Vec3& w) {
   return (w[0] > 0) + (w[1] > 0) + (w[2] > 0);
 }
 
-// Twice the area times the normal, from the two shorter edges: of a needle, the longer ones differ by less
-// than their round-off.
-Vec3 normal_of(const Vec3& a, const Vec3& b, const Vec3& c) {
-  const Vec3 ab = b - a, bc = c - b, ca = a - c;
-  const double lab = ab.squaredNorm(), lbc = bc.squaredNorm(), lca = ca.squaredNorm();
-  if (lbc >= lab && lbc >= lca) return ca.cross(ab);
-  return lca >= lab ? ab.cross(bc) : bc.cross(ca);
-}
+// A triangle's edges, with which its normal is taken: of a needle, the longer ones differ by less than their
+// round-off.
+struct Edges {
+  Vec3 ab, bc, ca;
+  double lab, lbc, lca;  // squared lengths
+  Edges(const Vec3& a, const Vec3& b, const Vec3& c)
+      : ab(b - a),
+        bc(c - b),
+        ca(a - c),
+        lab(ab.squaredNorm()),
+        lbc(bc.squaredNorm()),
+        lca(ca.squaredNorm()) {}
+  // Twice the area times the normal, from the two shorter edges.
+  NURBS_INLINE Vec3 normal() const {
+    if (lbc >= lab && lbc >= lca) return ca.cross(ab);
+    return lca >= lab ? ab.cross(bc) : bc.cross(ca);
+  }
+  double longest2() const { return std::max({lab, lbc, lca}); }
+};
 
 }  // namespace
 
@@ -36,7 +50,7 @@ Vec3 nearest_on_triangle(const Vec3& a, const Vec3& b, const Vec3& c) {
   Vec3 w = Vec3::Zero();
   w[i] = 1;
   if (dq <= 0 && dr <= 0) return w;
-  const Vec3 n = normal_of(a, b, c);
+  const Vec3 n = Edges(a, b, c).normal();
   const auto on_edge = [&](int to, double t) {
     w[to] = t;
     w[i] = 1 - t;
@@ -78,29 +92,41 @@ void GrowingHull::set(int f, int a, int b, int c) {
   face.alive = true;
   marked_[f] = false;
   const Vec3 &p = point_[a], &q = point_[b], &r = point_[c];
-  const Vec3 m = normal_of(p, q, r);
+  const Edges edges(p, q, r);
+  const Vec3 m = edges.normal();
   const double area2 = m.squaredNorm();
-  const double base2 = std::max({(q - p).squaredNorm(), (r - q).squaredNorm(), (p - r).squaredNorm()});
-  face.sliver = !(area2 > sliver_ * sliver_ * base2);
-  face.normal = face.sliver ? Vec3(Vec3::Zero()) : Vec3(m / std::sqrt(area2));
+  face.sliver = !(area2 > sliver_ * sliver_ * edges.longest2());
+  if (face.sliver)
+    face.normal.setZero();
+  else
+    face.normal = 1 / std::sqrt(area2) * m;
   face.offset = std::min({face.normal.dot(p), face.normal.dot(q), face.normal.dot(r)});
-  face.foot = false;
-  face.distance2 = face.offset * face.offset;
+  behind_ += face.offset < 0;
+  foot_[f] = false;
+  distance2_[f] = face.offset * face.offset;
+}
+
+void GrowingHull::drop(int f) {
+  face_[f].alive = false;
+  behind_ -= face_[f].offset < 0;
+  distance2_[f] = kFarAway;
 }
 
 // The plane's own foot where it lies inside, which is exact to round-off however far the corners are.
-void GrowingHull::find_foot(Face* f) const {
-  f->foot = true;
-  f->weights = nearest_on_triangle(point_[f->vertex[0]], point_[f->vertex[1]], point_[f->vertex[2]]);
-  if (count_positive(f->weights) < 3 || f->sliver) f->distance2 = nearest_point(*f).squaredNorm();
+void GrowingHull::find_foot(int f) {
+  Face& face = face_[f];
+  foot_[f] = true;
+  face.weights = nearest_on_triangle(point_[face.vertex[0]], point_[face.vertex[1]], point_[face.vertex[2]]);
+  if (count_positive(face.weights) < 3 || face.sliver) distance2_[f] = nearest_point(face).squaredNorm();
 }
 
 bool GrowingHull::start(int a, int b, int c, int d) {
   const Vec3 &p = point_[a], &q = point_[b], &r = point_[c], &s = point_[d];
   const double volume = (q - p).cross(r - p).dot(s - p);
-  faces_ = free_ = 0;
+  faces_ = free_ = behind_ = 0;
   if (volume == 0 || !std::isfinite(volume)) return false;
   if (volume > 0) std::swap(b, c);
+  std::fill(distance2_, distance2_ + kSide, kFarAway);
   set(0, a, b, c);
   set(1, b, a, d);
   set(2, c, b, d);
@@ -179,7 +205,7 @@ bool GrowingHull::chain_horizon() {
 bool GrowingHull::fan(int point) {
   if (faces_ + std::max(0, edges_ - visible_ - free_) > kHullFaces) return false;
   for (int k = 0; k < visible_; ++k) {
-    face_[seen_[k]].alive = false;
+    drop(seen_[k]);
     marked_[seen_[k]] = false;
     free_list_[free_++] = seen_[k];
   }
@@ -187,6 +213,7 @@ bool GrowingHull::fan(int point) {
   short first = -1, previous = -1;
   for (int k = 0; k < edges_; ++k) {
     const Edge& e = edge_[k];
+    if (free_ == 0 && faces_ % kSide == 0) std::fill_n(distance2_ + faces_, kSide, kFarAway);
     const short f = free_ > 0 ? free_list_[--free_] : static_cast<short>(faces_++);
     set(f, e.from, e.to, point);
     face_[f].across = {e.outside, -1, previous};
@@ -218,26 +245,36 @@ GrowingHull::Growth GrowingHull::add(int point, int first, double level) {
   return Growth::broken;
 }
 
+double GrowingHull::least_distance2() const {
+  Lane8 least, next;
+  std::memcpy(&least, distance2_, sizeof least);
+  for (int k = kSide; k < faces_; k += kSide) {
+    std::memcpy(&next, distance2_ + k, sizeof next);
+    least = next < least ? next : least;
+  }
+  double best = least[0];
+  for (int k = 1; k < kSide; ++k) best = std::min(best, least[k]);
+  return best;
+}
+
+// Feet are looked for where planes are nearer than all others' feet or planes.
 GrowingHull::Nearest GrowingHull::nearest() {
-  Nearest best{-1, kFarAway, true};
-  int corners = 0;
-  for (int k = 0; k < faces_; ++k) {
-    Face& f = face_[k];
-    if (!f.alive) continue;
-    if (!f.sliver && f.offset < 0) best.inside = false;
-    if (f.distance2 > best.distance2 * (1 + kTie)) continue;
-    if (!f.foot) {
-      find_foot(&f);
-      if (f.distance2 > best.distance2 * (1 + kTie)) continue;
-    }
-    const int on = count_positive(f.weights);
-    if (f.distance2 < best.distance2 * (1 - kTie) || on > corners) {
+  if (faces_ == 0) return {-1, kFarAway, true};
+  for (;;) {
+    const double within = least_distance2() * (1 + kTie);
+    Nearest best{-1, kFarAway, behind_ == 0};
+    int corners = 0;
+    for (int k = 0; k < faces_; ++k) {
+      if (!foot_[k] && !(distance2_[k] > within)) find_foot(k);
+      if (distance2_[k] > within) continue;
+      const int on = count_positive(face_[k].weights);
+      if (on <= corners) continue;
       best.face = k;
-      best.distance2 = f.distance2;
+      best.distance2 = distance2_[k];
       corners = on;
     }
+    if (best.face >= 0 || !(within < kFarAway)) return best;
   }
-  return best;
 }
 
 bool GrowingHull::closed() const {

@@ -22,12 +22,10 @@ class GrowingHull {
     std::array<short, 3> vertex;  // counterclockwise from outside
     std::array<short, 3> across;  // face on the other side of the edge vertex[k] -> vertex[k + 1]
     bool alive;
-    bool sliver;       // lower than `sliver_height`: normal and offset mean nothing
-    Vec3 normal;       // unit
-    double offset;     // normal . vertex: signed distance of its plane from the origin
-    bool foot;         // weights are known; until then distance2 is the plane's, which is no more
-    Vec3 weights;      // of its point nearest to the origin
-    double distance2;  // ... and how far that is, squared
+    bool sliver;    // lower than `sliver_height`: normal and offset mean nothing
+    Vec3 normal;    // unit
+    double offset;  // normal . vertex: signed distance of its plane from the origin
+    Vec3 weights;   // of its point nearest to the origin, once that was asked for
   };
   enum class Growth {
     grown,
@@ -77,7 +75,9 @@ class GrowingHull {
     short outside, slot;  // the face that stays, and which of its edges this is
   };
   void set(int f, int a, int b, int c);
-  void find_foot(Face* f) const;
+  void drop(int f);
+  void find_foot(int f);
+  double least_distance2() const;
   int highest_seen_from(const Vec3& p, double* height) const;
   bool find_visible(const Vec3& p, int first, double threshold);
   bool chain_horizon();
@@ -88,6 +88,12 @@ class GrowingHull {
   int points_ = 0, faces_ = 0;
   Vec3 point_[kHullVertices];
   Face face_[kHullFaces];
+  // How far a face's nearest point is from the origin, squared; its plane's, which is no more, until that is
+  // asked for (`foot_`); far away of dead ones, and up to the next multiple of kSide.
+  static constexpr int kSide = 8;
+  alignas(64) double distance2_[kHullFaces + kSide];
+  bool foot_[kHullFaces];
+  int behind_ = 0;  // living faces whose plane has the origin in front of it
   // Of one growth: faces seen, their horizon in order round; numbers of dead faces to give again.
   int visible_ = 0, edges_ = 0, free_ = 0;
   short seen_[kHullFaces], free_list_[kHullFaces];

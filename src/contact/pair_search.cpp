@@ -23,10 +23,11 @@ namespace {
 constexpr double kGuessAbove = 0.1;    // of the smaller radius: a guess that much above the lowest is none
 constexpr double kSameGuess = 0.9995;  // cosine between refined guesses: the atlases tell no more apart
 constexpr double kOnFeature = 0.97;    // cosine between a direction and its support's normal: less on an edge
-constexpr double kRoughSupport = 1e-5;  // of the body, that the supports Newton begins from may lack
-constexpr double kNearlyClosed = 100;  // tolerances
-constexpr double kOffSurface = 1e-7;   // of the body: polished points may be
-constexpr double kNormalShare = 0.5;   // of the tolerance, by which the overlap along a normal may exceed it
+constexpr double kRoughSupport = 1e-5;  // of the body, that the supports Newton begins from may lack ...
+constexpr double kRoughSlope = 2e-3;    // rad, ... and how far off they may be
+constexpr double kNearlyClosed = 100;   // tolerances
+constexpr double kOffSurface = 1e-7;    // of the body: polished points may be
+constexpr double kNormalShare = 0.5;    // of the tolerance, by which the overlap along a normal may exceed it
 
 bool set_separated(double lower, double reach, Rung rung, ContactResult* r) {
   if (!(lower > reach)) return false;
@@ -195,15 +196,19 @@ class Ladder {
   // A minimum of p that may not be the only one, whatever certificate: the polytope finds the others.
   static bool is_too_deep(const JointSolution& s) { return s.stationary && -s.gap > s.bracket.unique; }
 
+  static Support rough_support(const Shape& shape, const Vec3& d) {
+    return find_hull_support(shape, d, nullptr, kRoughSupport * shape.bounding_radius, kRoughSlope);
+  }
+
   // Newton from the supports along a guessed direction, certified or not. False where a support lies on an
   // edge or a vertex: its surfaces have no such normal.
   bool polish(const PairFrame& pair, const DirectionGuess& guess, double tolerance, JointSolution* joint,
               int* spent) const {
     ++*spent;
     const Vec3 on_b = pair.direction_on_b(guess.d);
-    const Support a = find_hull_support(*pair.a, guess.d, nullptr, kRoughSupport * pair.a->bounding_radius);
+    const Support a = rough_support(*pair.a, guess.d);
     if (a.normal.dot(guess.d) < kOnFeature) return false;
-    const Support b = find_hull_support(*pair.b, on_b, nullptr, kRoughSupport * pair.b->bounding_radius);
+    const Support b = rough_support(*pair.b, on_b);
     if (b.normal.dot(on_b) < kOnFeature) return false;
     *joint = solve_joint(pair, a.where, b.where, tolerance, settings_.reach, kPolishIterations);
     if (!joint->converged) confirm(pair, tolerance, *joint);

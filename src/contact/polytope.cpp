@@ -3,6 +3,8 @@
 
 #include <array>
 #include <cmath>
+#include <new>
+#include <type_traits>
 
 #include "body/cube_map.h"
 #include "body/hull_point.h"
@@ -15,7 +17,23 @@
 namespace nurbs {
 namespace {
 
-// What the hull's point of the same number came from. Left uninitialised: hundreds lie on the stack.
+// Room for many, each made when it is put there.
+template <class T, int N>
+class Room {
+  static_assert(std::is_trivially_destructible_v<T>);
+
+ public:
+  T& put(int k, const T& value) { return *new (bytes_ + k * sizeof(T)) T(value); }
+  T& operator[](int k) { return *std::launder(reinterpret_cast<T*>(bytes_ + k * sizeof(T))); }
+  const T& operator[](int k) const {
+    return *std::launder(reinterpret_cast<const T*>(bytes_ + k * sizeof(T)));
+  }
+
+ private:
+  alignas(T) unsigned char bytes_[N * sizeof(T)];
+};
+
+// What the hull's point of the same number came from.
 struct Witness {
   Vec3 a, b;  // of the shrunk bodies
   Vec3 d;     // asked
@@ -125,8 +143,7 @@ class Search {
                  inner = 0.5 * angle, far = *level / std::sin(angle - inner), least = 0.9 * *level;
     const Vec3 t = middle_.unitOrthogonal(), s = middle_.cross(t);
     const auto give_away = [&](const Vec3& g) {
-      witness_[hull_.points()] = witness_[0];
-      witness_[hull_.points()].cap = true;
+      witness_.put(hull_.points(), witness_[0]).cap = true;
       hull_.store(g);
     };
     for (int k = 0; k < kRim; ++k) {
@@ -294,16 +311,12 @@ class Search {
   // The points of both bodies as the hull's next; not when it is full.
   int take(const Vec3& d, const HullPoint& a, const HullPoint& b) {
     const int v = hull_.points();
-    Witness& w = witness_[v];
-    w.cap = false;
-    w.d = d;
+    const double p = pair_.overlap_along(d, a.upper, b.upper);
     // The centres of balls that touch there from inside lie in the cores, exactly.
-    w.a = pair_.place_a(a.point) - shrink_a_ * a.normal;
-    w.b = pair_.offset + pair_.turn * (pair_.scale_b * b.point - shrink_b_ * b.normal);
-    w.on_a = a.where;
-    w.on_b = b.where;
-    const double p = w.p = pair_.overlap_along(d, a.upper, b.upper);
-    Vec3 g = w.a - w.b;
+    const Vec3 on_a = pair_.place_a(a.point) - shrink_a_ * a.normal,
+               on_b = pair_.offset + pair_.turn * (pair_.scale_b * b.point - shrink_b_ * b.normal);
+    witness_.put(v, {on_a, on_b, d, p, a.where, b.where, false});
+    Vec3 g = on_a - on_b;
     if (joggle_ > 0) g += joggle_ * scatter(g);
     hull_.store(g);
     ++queries_;
@@ -420,8 +433,7 @@ class Search {
     const Vec3 d = witness_[v].d;
     Cap cap{d, level, std::cos(angle), std::cos(kCapUsed * angle), slope, hull_.points(), v};
     hull_.store(level / cap.used * d);
-    witness_[cap.vertex] = witness_[v];
-    witness_[cap.vertex].cap = true;
+    witness_.put(cap.vertex, witness_[v]).cap = true;
     cap_[caps_++] = cap;
     if (hull_.faces() > 0) hull_.grow(cap.vertex, least_height());
     return kCapUsed * angle;
@@ -734,7 +746,7 @@ class Search {
   void refine_pair(Vec3* a, Vec3* b) {
     for (int k = 0; k < kMostFacing; ++k) {
       const Facing near = find_nearest_pair(a, b);
-      if (near.off <= std::max(kFacingShare * tolerance_, roundoff()) || near.face < 0) return;
+      if (near.off <= std::max(0.1 * kFacing * pair_.size, roundoff()) || near.face < 0) return;
       const int v = query(near.towards.normalized(), closest_of(hull_.face(near.face), direction_));
       if (v < 0 || hull_.grow(v, 0.0, near.face) != GrowingHull::Growth::grown) return;
     }
@@ -805,7 +817,7 @@ class Search {
   Vec3 minimum_[kMostMinima];           // directions surrounded
   int tried_[kMostMinima], tries_ = 0;  // points about which caps were tried by cores
   int before_cores_ = kBeforeCores;
-  Witness witness_[kHullVertices];
+  Room<Witness, kHullVertices> witness_;
   GrowingHull hull_;
 };
 

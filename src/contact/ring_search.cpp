@@ -4,19 +4,21 @@
 #include <algorithm>
 #include <cmath>
 
+#include "contact/half_plane_hull.h"
+
 namespace nurbs {
 namespace {
 
-constexpr int kMostCircles = 256;          // supports evaluated, one as dear as ...
-constexpr int kCircleCost = 4;             // ... sectors
-constexpr double kMostSpent = 2400;        // sectors bounded, some 0.3 us each, and circles
-constexpr double kMostCompared = 1e6;      // circles in their hulls, 2 ns each
-constexpr double kMostComparedLast = 4e6;  // ... where nothing else did
-constexpr double kFirstSpent = 0.25;       // of either, after which it ends ...
-constexpr double kFirstSpentLast = 0.375;  // ... and where nothing else did
-constexpr double kHopeless = 0.1;          // ... where less than this times its share of all is closed
-constexpr int kDeepestSector = 60;         // halvings of the azimuth
-constexpr double kNearAxis = 0.2;          // sine between the axes up to which both bodies' circles are used
+constexpr int kMostCircles = HalfPlaneHull::kMost;  // supports evaluated, one as dear as ...
+constexpr int kCircleCost = 4;                      // ... sectors
+constexpr double kMostSpent = 2400;                 // sectors bounded, some 0.3 us each, and circles
+constexpr double kMostCompared = 1e6;               // circles in their hulls, 2 ns each
+constexpr double kMostComparedLast = 4e6;           // ... where nothing else did
+constexpr double kFirstSpent = 0.25;                // of either, after which it ends ...
+constexpr double kFirstSpentLast = 0.375;           // ... and where nothing else did
+constexpr double kHopeless = 0.1;       // ... where less than this times its share of all is closed
+constexpr int kDeepestSector = 60;      // halvings of the azimuth
+constexpr double kNearAxis = 0.2;       // sine between the axes up to which both bodies' circles are used
 constexpr double kNearlyAlike = 0.1;    // of the body's radius: what directions of a ring may differ by ...
 constexpr double kHardlyAlike = 0.4;    // ... where nothing else did
 constexpr double kClosedShare = 0.9;    // of the tolerance at which a sector is closed ...
@@ -82,10 +84,6 @@ struct View {
   Vec3 across(const Vec3& x) const { return x - axis.dot(x) * axis; }
 };
 
-struct Angle {
-  double c, s;
-};
-
 // What one support evaluation says of every direction.
 struct Circle {
   double r, z;  // of K
@@ -99,95 +97,26 @@ struct Circle {
   bool lone = false;
 };
 
-// (R, Z) of a circle at one azimuth.
-struct Meridian {
-  double r, z;
+// What projections need of it, apart: they go through all.
+struct Flat {
+  double r, z;    // radius of K's, and its height over M's
+  double x, y;    // of M's centre across the axis ...
+  double length;  // ... and how far that is from it
 };
-
-// The least over angles between two of the greatest of r s + z c.
-struct Least {
-  double value;
-  Angle at;
-  int from, to;     // circles level there, equal at an end of the range
-  Angle low, high;  // all that is below the threshold lies between
-  int corners;      // of the polygon that were passed
+struct FlatCircle {
+  Angle at, u;  // angle from the axis and azimuth asked for
+  double rm;
+  bool lone;
+  Flat whole, alone;  // as a circle, and as its point
 };
 
 double square(double x) {
   return x * x;
 }
 
-double cross(const Angle& x, const Angle& y) {
-  return x.c * y.s - x.s * y.c;
-}
-
-// Half way between two angles of [0, pi], low first.
-Angle middle(const Angle& low, const Angle& high) {
-  Angle sum{low.c + high.c, low.s + high.s};
-  if (square(sum.c) + square(sum.s) < 1)
-    sum = {high.s - low.s, low.c - high.c};  // square to their difference
-  const double length = std::sqrt(square(sum.c) + square(sum.s));
-  return {sum.c / length, sum.s / length};
-}
-
-// An angle between `above` and `below` up to which r s + z c, that high at them, is at least `threshold`: it
-// is linear along the chord.
-Angle level_at(const Angle& above, const Angle& below, double high, double low, double threshold) {
-  if (!(above.c * below.c + above.s * below.s > 0 && high > threshold && threshold > 0)) return above;
-  const double t = (high - threshold) / (high - low), c = above.c + t * (below.c - above.c),
-               s = above.s + t * (below.s - above.s), length = std::hypot(c, s);
-  return {c / length, s / length};
-}
-
-// Between two points of the polygon the support function is concave where positive: its minimum and all that
-// is below `threshold` is found from the angles where the greatest changes. Negative: minus infinity.
-// `noise`: round-off of the points.
-Least least_of_greatest(const Meridian* p, int count, Angle low, Angle high, double threshold, double noise) {
-  const auto height = [&](int i, const Angle& e) { return p[i].r * e.s + p[i].z * e.c; };
-  int top = 0;
-  for (int i = 1; i < count; ++i)
-    if (height(i, low) > height(top, low)) top = i;
-  Least least{height(top, low), low, top, top, low, high, 1};
-  bool some = least.value < threshold, open = some;
-  Angle now = low;
-  for (int over = -1; over != top;) {
-    if (over >= 0) top = over;
-    Angle next = high;
-    double steepest = noise;
-    over = top;
-    for (int j = 0; j < count; ++j) {
-      const Angle level{p[j].r - p[top].r, p[top].z - p[j].z};  // where j comes above
-      const double turn = cross(now, level);
-      if (turn > noise) {
-        if (!(level.s > 0 && cross(level, next) > 0)) continue;
-        next = level;
-      } else {  // level now, as three points of a line are: the steepest goes on
-        if (!(turn > -noise && now.c * level.c + now.s * level.s > steepest)) continue;
-        next = now;
-        steepest = now.c * level.c + now.s * level.s;
-      }
-      over = j;
-    }
-    ++least.corners;
-    const double length = std::sqrt(square(next.c) + square(next.s));
-    next = {next.c / length, next.s / length};
-    const double h = height(top, next);
-    if (h < least.value) least = {h, next, top, over, least.low, least.high, least.corners};
-    if (h < threshold) {
-      if (!some) least.low = level_at(now, next, height(top, now), h, threshold);
-      some = open = true;
-      least.high = high;
-    } else if (open) {
-      least.high = level_at(next, now, h, height(top, now), threshold);
-      open = false;
-    }
-    now = next;
-  }
-  if (!(least.value > 0)) least.value = -kFarAway;
-  return least;
-}
-
 class RingSearch {
+  using Least = HalfPlaneHull::Least;
+
  public:
   // `core`: of the bodies, and the balls that roll inside them, instead of the bodies.
   // `arcs`: of K, where that is not of revolution itself.
@@ -214,12 +143,12 @@ class RingSearch {
     on_m_ = last_m_;
     const double alike = differ() / (view_.scale_k * view_.k->bounding_radius);
     if (!(alike < (last ? kHardlyAlike : kNearlyAlike))) return false;
-    const double phi = azimuth(e);
+    const Sector all = sector_at(azimuth(e), M_PI, {1, 0}, {-1, 0}, 1);
     for (int k = 0; k < kFirstAngles; ++k) {
       const double angle = M_PI * k / (kFirstAngles - 1);
-      query(direction({std::cos(angle), std::sin(angle)}, phi));
+      query(direction({std::cos(angle), std::sin(angle)}, all.u));
     }
-    if (!close(phi, last)) return false;
+    if (!close(all, last)) return false;
     fill(result);
     return true;
   }
@@ -228,13 +157,29 @@ class RingSearch {
   struct Sector {
     double phi, half;
     Angle low, high;
-    double share;  // halved with the sector
+    double share;   // halved with the sector
+    Angle u, turn;  // cosine and sine of phi and of half
+
+    void set_half(double to) {
+      half = to;
+      turn = {std::cos(to), std::sin(to)};
+    }
+    // By `half`, to either side (sign: 1, -1).
+    void move(double sign) {
+      phi += sign * half;
+      u = {u.c * turn.c - sign * u.s * turn.s, u.s * turn.c + sign * u.c * turn.s};
+    }
   };
+  Sector sector_at(double phi, double half, const Angle& low, const Angle& high, double share) const {
+    Sector s{phi, half, low, high, share, {std::cos(phi), std::sin(phi)}, {1, 0}};
+    s.set_half(half);
+    return s;
+  }
 
   double balls() const { return view_.ball + view_.ball_k; }
   double azimuth(const Vec3& e) const { return std::atan2(second_.dot(e), tangent_.dot(e)); }
-  Vec3 outward(double phi) const { return std::cos(phi) * tangent_ + std::sin(phi) * second_; }
-  Vec3 direction(const Angle& a, double phi) const { return a.s * outward(phi) + a.c * view_.axis; }
+  Vec3 outward(const Angle& u) const { return u.c * tangent_ + u.s * second_; }
+  Vec3 direction(const Angle& a, const Angle& u) const { return a.s * outward(u) + a.c * view_.axis; }
 
   // How much a turn about K's axis changes at the first direction.
   double differ() const {
@@ -261,9 +206,9 @@ class RingSearch {
     if (count_ == kMostCircles) return false;
     const double enough = kSupportShare * tolerance_;
     const Support k = find_hull_support(*view_.k, view_.turn_k.transpose() * e, nullptr,
-                                        enough / view_.scale_k),
+                                        enough / view_.scale_k, kHullSlope),
                   m = find_hull_support(*view_.m, view_.turn_m.transpose() * -e, nullptr,
-                                        enough / view_.scale_m);
+                                        enough / view_.scale_m, kHullSlope);
     ++queries_;
     Circle c;
     const Vec3 x = view_.turn_k * (view_.scale_k * k.point - view_.ball_k * k.normal),
@@ -284,6 +229,9 @@ class RingSearch {
       c.rm = (xm - c.middle).norm();
     }
     c.k = view_.offset - view_.point + c.middle;
+    const double around = c.at.s > 0 ? 1 / c.at.s : 0;
+    const Angle u{around * tangent_.dot(e), around * second_.dot(e)};
+    flat_[count_] = {c.at, u, c.rm, c.lone, flat(c.r, c.z, c.k), flat(0, 0, c.k - c.on_k)};
     insert(c);
     const double p = view_.scale_k * k.upper + view_.scale_m * m.upper - balls() - e.dot(view_.offset);
     last_ = p;
@@ -296,6 +244,11 @@ class RingSearch {
       on_m_ = last_m_;
     }
     return true;
+  }
+
+  Flat flat(double r, double z, const Vec3& k) const {
+    const double x = tangent_.dot(k), y = second_.dot(k);
+    return {r, z - view_.axis.dot(k), x, y, std::sqrt(x * x + y * y)};
   }
 
   bool on_arcs(const Circle& c) const {
@@ -316,32 +269,32 @@ class RingSearch {
   // The order of circles is that of the angles they were asked for. Chosen are those asked for in a sector,
   // and some on either side, of a mate's points some that were asked for at azimuths near the sector's.
   void choose(const Sector& sector, double half) {
-    const auto before = [&](short c, const Angle& a) { return cross(circle_[c].at, a) > 0; };
+    const auto before = [&](short c, const Angle& a) { return cross(flat_[c].at, a) > 0; };
     const short *const begin = order_, *const end = order_ + count_;
     const auto first = static_cast<int>(std::lower_bound(begin, end, sector.low, before) - begin),
                last = static_cast<int>(std::lower_bound(begin, end, sector.high, before) - begin);
     const double reach = std::max(kNearAzimuth, 2 * half);
-    const Vec3 u = outward(sector.phi);
-    const auto near = [&](const Circle& c) {
-      return (view_.circles && !c.lone) || reach > 1 ||
-             (c.e - c.at.s * u - c.at.c * view_.axis).squaredNorm() <= square(reach * c.at.s);
+    const Angle& u = sector.u;
+    const auto near = [&](const FlatCircle& c) {
+      return (view_.circles && !c.lone) || reach > 1 || c.at.s == 0 ||
+             2 - 2 * (c.u.c * u.c + c.u.s * u.s) <= square(reach);
     };
     chosen_ = 0;
     for (int i = first - 1, beside = 0; i >= 0 && beside < kBeside; --i) {
-      const bool counts = near(circle_[order_[i]]);
+      const bool counts = near(flat_[order_[i]]);
       if (counts || first - i <= kBeside) which_[chosen_++] = order_[i];
       beside += counts;
     }
     for (int i = first; i < last; ++i) which_[chosen_++] = order_[i];
     for (int i = last, beside = 0; i < count_ && beside < kBeside; ++i) {
-      const bool counts = near(circle_[order_[i]]);
+      const bool counts = near(flat_[order_[i]]);
       if (counts || i - last < kBeside) which_[chosen_++] = order_[i];
       beside += counts;
     }
   }
   void insert(const Circle& c) {
     int at = count_;
-    for (; at > 0 && cross(c.at, circle_[order_[at - 1]].at) > 0; --at) order_[at] = order_[at - 1];
+    for (; at > 0 && cross(c.at, flat_[order_[at - 1]].at) > 0; --at) order_[at] = order_[at - 1];
     order_[at] = static_cast<short>(count_);
     circle_[count_++] = c;
   }
@@ -386,29 +339,35 @@ class RingSearch {
     return alone;
   }
 
-  // Of the chosen circles for azimuths within `half` of the sector's.
+  // Of the chosen circles for azimuths within `half` of the sector's, that or 0.
   void project(const Sector& sector, double half) {
-    const double phi = sector.phi;
-    const Vec3 u = outward(phi), left = outward(phi - half), right = outward(phi + half);
+    const Angle &u = sector.u, turn = half > 0 ? sector.turn : Angle{1, 0};
     const Reach over = reach_of(sector);
-    const double cosine = std::cos(half);
+    const double lost = over.sine > view_.tilt ? turned(over, half, 1) / over.sine : 0;
+    const bool on_arcs = !view_.arcs || view_.arcs->holds(sector.phi, half);
+    const Vec3& b = view_.mate_axis;
+    const double bx = tangent_.dot(b), by = second_.dot(b), bz = view_.axis.dot(b);
+    hull_.clear();
     for (int i = 0; i < chosen_; ++i) {
-      const Circle c = known(circle_[which_[i]], phi, half);
-      const Vec3 k = view_.across(c.k);
-      double reach = std::max(k.dot(left), k.dot(right));  // the most of k.u over the interval
-      if (half >= M_PI) {
-        reach = k.norm();
-      } else if (half > 0) {
-        const double length = k.norm();
-        if (k.dot(u) >= cosine * length) reach = length;
+      const FlatCircle& c = flat_[which_[i]];
+      const Flat& k = on_arcs && !c.lone ? c.whole : c.alone;
+      const double along = k.x * u.c + k.y * u.s, across = k.y * u.c - k.x * u.s;
+      // The most of it over the interval.
+      const bool inside = half >= M_PI || along >= turn.c * k.length;
+      const double reach =
+          half > 0 ? (inside ? k.length : along * turn.c + std::abs(across) * turn.s) : along;
+      double r = k.r - reach, z = k.z;
+      if (c.rm > 0) {  // the tangent of M's circle that faces e
+        const double ex = c.at.s * u.c, ey = c.at.s * u.s, ez = c.at.c;
+        const double x = ey * bz - ez * by, y = ez * bx - ex * bz, w = ex * by - ey * bx,
+                     sine = std::sqrt(x * x + y * y + w * w);
+        if (sine > kNoDirection) {
+          const double rm = c.rm / sine, px = by * w - bz * y, py = bz * x - bx * w, pz = bx * y - by * x;
+          r += rm * (px * u.c + py * u.s) - c.rm * lost;
+          z += rm * pz;
+        }
       }
-      meridian_[i] = {c.r - reach, c.z - view_.axis.dot(c.k)};
-      if (!(c.rm > 0)) continue;
-      const Facing m = facing(c.at, u);
-      if (!(m.sine > kNoDirection)) continue;  // the tangent plane 0
-      meridian_[i].r += c.rm * m.point.dot(u);
-      meridian_[i].z += c.rm * m.point.dot(view_.axis);
-      if (over.sine > view_.tilt) meridian_[i].r -= turned(over, half, c.rm) / over.sine;
+      hull_.add(r, z);
     }
   }
 
@@ -422,8 +381,8 @@ class RingSearch {
       for (int i = 0; i < chosen_; ++i) widest = std::max(widest, circle_[which_[i]].rm);
       turned = this->turned(over, half, widest);
     }
-    Least least = least_of_greatest(meridian_, chosen_, sector.low, sector.high, threshold + turned + noise_,
-                                    4 * kRoundoff * pair_.reach);
+    Least least =
+        hull_.least(sector.low, sector.high, threshold + turned + noise_, 4 * kRoundoff * pair_.reach);
     least.value -= turned + noise_;
     compared_ += static_cast<long>(least.corners) * chosen_;
     return least;
@@ -518,7 +477,7 @@ class RingSearch {
   // more. `narrower`: the angles should be halved rather than the azimuths; they are where they reach far, as
   // from one minimum to another.
   double second_order(const Sector& sector, const Least& here, bool* narrower) const {
-    const Vec3 u = outward(sector.phi), across = view_.axis.cross(u);
+    const Vec3 u = outward(sector.u), across = view_.axis.cross(u);
     const double c = here.at.c, s = here.at.s;
     const auto too_far = [&](const Angle& a) { return !(c * a.c + s * a.s > kWidestSecond); };
     *narrower = too_far(sector.low) || too_far(sector.high);
@@ -574,13 +533,13 @@ class RingSearch {
     return round + least - lost - noise_;
   }
 
-  bool close(double phi, bool last) {
+  bool close(const Sector& all, bool last) {
     const double most_compared = last ? kMostComparedLast : kMostCompared,
                  first_spent = last ? kFirstSpentLast : kFirstSpent;
     Sector stack[kDeepestSector + 2];
     int top = 0, sectors = 0;
     double closed = 0;
-    stack[top++] = {phi, M_PI, {1, 0}, {-1, 0}, 1};
+    stack[top++] = all;
     proven_ = kFarAway;
     while (top > 0) {
       const double spent =
@@ -614,12 +573,14 @@ class RingSearch {
         if (narrower) {
           sector.high = other.low = middle(sector.low, sector.high);
         } else {
-          sector.half = other.half = 0.5 * sector.half;
-          sector.phi -= sector.half;
-          other.phi += other.half;
+          sector.set_half(0.5 * sector.half);
+          other.half = sector.half;
+          other.turn = sector.turn;
+          sector.move(-1);
+          other.move(1);
         }
         stack[top++] = other;
-      } else if (!query(direction(here.at, sector.phi))) {
+      } else if (!query(direction(here.at, sector.u))) {
         return false;
       }
     }
@@ -635,16 +596,15 @@ class RingSearch {
     r->converged = true;
     r->points.na = d;
     r->points.nb = -d;
-    const double phi = azimuth(best_e_);
-    const Least least = bound({phi, 0, {1, 0}, {-1, 0}, 0}, 0, -kFarAway);
+    const Sector there = sector_at(azimuth(best_e_), 0, {1, 0}, {-1, 0}, 0);
+    const Least least = bound(there, 0, -kFarAway);
     // The circles level there, so weighted that the witnesses face each other.
-    const Meridian &p = meridian_[least.from], &q = meridian_[least.to];
-    const Angle across{-least.at.s, least.at.c};
-    const double tp = p.r * across.c + p.z * across.s, tq = q.r * across.c + q.z * across.s;
+    const auto slope = [&](int k) { return hull_.r(k) * least.at.c - hull_.z(k) * least.at.s; };
+    const double tp = slope(least.from), tq = slope(least.to);
     const double share = tp != tq ? std::clamp(tq / (tq - tp), 0.0, 1.0) : 1.0;
     Vec3 xk, xm, yk, ym;
-    witness(circle_[which_[least.from]], phi, &xk, &xm);
-    witness(circle_[which_[least.to]], phi, &yk, &ym);
+    witness(circle_[which_[least.from]], there, &xk, &xm);
+    witness(circle_[which_[least.to]], there, &yk, &ym);
     const Vec3 on_k = share * xk + (1 - share) * yk, on_m = share * xm + (1 - share) * ym;
     const bool k_is_a = view_.sign > 0;
     r->points.a = k_is_a ? on_k : on_m;
@@ -655,12 +615,12 @@ class RingSearch {
     part_points(r);
   }
 
-  void witness(const Circle& c, double phi, Vec3* on_k, Vec3* on_m) const {
-    const Vec3 at = known(c, phi, 0).lone ? c.on_k : Vec3(c.r * outward(phi) + c.z * view_.axis);
+  void witness(const Circle& c, const Sector& there, Vec3* on_k, Vec3* on_m) const {
+    const Vec3 at = known(c, there.phi, 0).lone ? c.on_k : Vec3(c.r * outward(there.u) + c.z * view_.axis);
     *on_k = view_.point + at + view_.ball_k * best_e_;
     *on_m = c.middle - view_.ball * best_e_;
     if (!view_.circles) return;
-    const Vec3 e = direction(c.at, phi), square = e - view_.mate_axis.dot(e) * view_.mate_axis;
+    const Vec3 e = direction(c.at, there.u), square = e - view_.mate_axis.dot(e) * view_.mate_axis;
     if (square.norm() > kNoDirection) *on_m -= c.rm * square.normalized();
   }
 
@@ -675,9 +635,10 @@ class RingSearch {
   int count_ = 0, queries_ = 0;
   long compared_ = 0;  // circles, in plane hulls
   Circle circle_[kMostCircles];
+  FlatCircle flat_[kMostCircles];
   short order_[kMostCircles];
   int chosen_ = 0, which_[kMostCircles];
-  Meridian meridian_[kMostCircles];  // of the chosen
+  HalfPlaneHull hull_;  // of the chosen
 };
 
 // About the axis of K's revolution or, if not null, of these arcs.

@@ -246,6 +246,7 @@ constexpr double kCoreError = 0.1;      // of the tolerance, that sphero-polyhed
 constexpr double kFlatStart = 1e-3;     // volume of a first tetrahedron over its longest edge cubed, at least
 constexpr int kFlatRounds = 4;          // of looking for a better one
 constexpr double kLeastHeight = 0.02;   // of the tolerance: a point less high above a face is not added
+constexpr double kHullSlope = 1e-7;     // rad: points of the polytope's hull are this near to their supports'
 constexpr double kSupportShare = 0.01;  // of the tolerance that a support may lack
 constexpr int kMostMinima = 8;          // of p(d) that are gone straight to and surrounded
 constexpr double kPolishAbove = 0.1;  // of the least overlap seen: one more than that above it is no minimum
