@@ -2,6 +2,7 @@
 #include "body/connectivity.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 
@@ -266,26 +267,45 @@ Vec3 edge_tangent(const BezierPatch& patch, int edge, const Vec2& at, const Loca
   return own.norm() > kNoDirection * length ? own : beside;
 }
 
+// What both sides are like at a point of their joint.
+struct JointSample {
+  Vec2 at;
+  LocalForm a, b;
+  bool counts;  // an end of the edge may be a pole, where the kink has no meaning; the next sample sees it
+  double sine() const { return std::min(a.sine(), b.sine()); }
+};
+
+std::array<JointSample, kKinkSamples> sample_joint(const std::vector<BezierPatch>& patches, int p, int e,
+                                                   const EdgeLink& link) {
+  std::array<JointSample, kKinkSamples> samples;
+  for (int k = 0; k < kKinkSamples; ++k) {
+    JointSample& s = samples[k];
+    const double t = k / (kKinkSamples - 1.0);
+    s.at = edge_parameters(e, t);
+    s.a = local_form(patches[p], s.at[0], s.at[1]);
+    const double guess = link.projected ? projected_parameter(patches[link.patch], link, s.a.point)
+                                        : partner_parameter(link, t);
+    const Vec2 there =
+        edge_parameters(link.edge, refine_closest(patches[link.patch], link.edge, s.a.point, guess));
+    s.b = local_form(patches[link.patch], there[0], there[1]);
+    const bool end = k == 0 || k == kKinkSamples - 1;
+    s.counts = !end || (Vec2(s.a.u, s.a.v) == s.at && Vec2(s.b.u, s.b.v) == there);
+  }
+  return samples;
+}
+
 double edge_kink(const std::vector<BezierPatch>& patches, int p, int e, const EdgeLink& link,
                  KinkSummary& worst) {
-  double kink = 0;
+  double kink = 0, most = 0;
   const bool forward = e == 1 || e == 2;  // the free parameter runs with the patch on its left
-  for (int k = 0; k < kKinkSamples; ++k) {
-    const double t = k / (kKinkSamples - 1.0);
-    const Vec2 at = edge_parameters(e, t);
-    const LocalForm a = local_form(patches[p], at[0], at[1]);
-    // An end of the edge may be a pole, where the kink has no meaning; the next sample sees it.
-    const bool end = k == 0 || k == kKinkSamples - 1;
-    if (end && (a.u != at[0] || a.v != at[1])) continue;
-    const double guess =
-        link.projected ? projected_parameter(patches[link.patch], link, a.point) : partner_parameter(link, t);
-    const double s = refine_closest(patches[link.patch], link.edge, a.point, guess);
-    const Vec2 there = edge_parameters(link.edge, s);
-    const LocalForm b = local_form(patches[link.patch], there[0], there[1]);
-    if (end && (b.u != there[0] || b.v != there[1])) continue;
-    const Vec3 along = (forward ? 1.0 : -1.0) * edge_tangent(patches[p], e, at, a);
-    const double angle = signed_angle(a.normal, b.normal, along);
-    if (angle < 0) add_groove(-angle, a, b, p, e, along.cross(a.normal), worst);
+  const std::array<JointSample, kKinkSamples> samples = sample_joint(patches, p, e, link);
+  for (const JointSample& s : samples) most = std::max(most, s.sine());
+  for (const JointSample& s : samples) {
+    // Where tangents come into line, normals are what the last digits of the control points make of them.
+    if (!s.counts || s.sine() < std::min(kJointSine, kJointSineShare * most)) continue;
+    const Vec3 along = (forward ? 1.0 : -1.0) * edge_tangent(patches[p], e, s.at, s.a);
+    const double angle = signed_angle(s.a.normal, s.b.normal, along);
+    if (angle < 0) add_groove(-angle, s.a, s.b, p, e, along.cross(s.a.normal), worst);
     worst.convex = std::max(worst.convex, angle);
     if (std::abs(angle) > std::abs(kink)) kink = angle;
   }

@@ -140,9 +140,10 @@ class Probe {
   Probe(const Shape& shape, const Clouds& clouds, double spacing)
       : shape_(shape), clouds_(clouds), spacing_(spacing) {}
 
-  // h(n) - n . x at a point.
+  // h(n) - n . x at a point, where that has a normal.
   double excess(const SurfacePoint& at) const {
     const LocalForm f = form(at);
+    if (f.in_line()) return 0;  // seen beside it
     double most = 0;
     for (const Vec3& y : supports(f.normal, at)) most = std::max(most, f.normal.dot(y - f.point));
     return std::max(0.0, most - raised_by_roundoff(shape_, at));
@@ -153,6 +154,7 @@ class Probe {
   double depth(const SurfacePoint& at) const {
     const LocalForm f = form(at);
     double upper = excess(at);
+    if (!(upper > 0)) return 0;
     // In a shallow dent the hull's plane is tilted by at most about sqrt(2 excess / radius).
     const double tilt = std::min(kWidestTilt, 4 * std::sqrt(2 * upper / shape_.bounding_radius));
     Mat3 axes;

@@ -23,13 +23,17 @@ std::vector<SurfaceSample> sample_surface(const std::vector<BezierPatch>& patche
   std::vector<SurfaceSample> samples;
   samples.reserve(patches.size() * n * n);
   for (size_t p = 0; p < patches.size(); ++p) {
+    std::vector<SurfaceSample> in_line;
+    const size_t before = samples.size();
     for (int i = 0; i < n; ++i) {
       for (int j = 0; j < n; ++j) {
         const LocalForm f = local_form(patches[p], i / (n - 1.0), j / (n - 1.0));
         const double spacing = std::max(f.su.norm(), f.sv.norm()) / (n - 1);
-        samples.push_back({{static_cast<int>(p), f.u, f.v}, f.point, f.normal, f.k_min, f.k_max, spacing});
+        (f.in_line() ? in_line : samples)
+            .push_back({{static_cast<int>(p), f.u, f.v}, f.point, f.normal, f.k_min, f.k_max, spacing});
       }
     }
+    if (samples.size() == before) samples.insert(samples.end(), in_line.begin(), in_line.end());
   }
   return samples;
 }

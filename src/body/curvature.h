@@ -15,7 +15,8 @@ struct SurfaceSample {
   double spacing;       // distance to the next sample, about
 };
 
-// A square grid on every patch, edges included: about 3,000 points in all, at least 4 x 4 a patch.
+// A square grid on every patch, edges included, but for corners without a normal: about 3,000 points in all,
+// at least 4 x 4 a patch.
 std::vector<SurfaceSample> sample_surface(const std::vector<BezierPatch>& patches);
 
 // The strict bounds of the whole body's convex hull: an opening kink is a crease (radius 0), a closing one is

@@ -2,6 +2,7 @@
 #pragma once
 
 #include "nurbs/bezier_patch.h"
+#include "nurbs/tolerances.h"
 #include "nurbs/types.h"
 
 namespace nurbs {
@@ -16,6 +17,10 @@ struct LocalForm {
   Mat2 first = Mat2::Zero();    // E F G
   Mat2 second = Mat2::Zero();   // -(L M N)
   double k_min = 0, k_max = 0;  // principal curvatures, 1/length
+
+  // Tangents in line: the normal is what the last digits of the control points make of it.
+  bool in_line() const { return sine() <= kLeastSine; }
+  double sine() const { return su.cross(sv).norm() / (su.norm() * sv.norm()); }
 };
 
 // Form at (u, v); where the parametrisation is singular (pole, collapsed edge, corner with parallel edges),

@@ -130,15 +130,6 @@ NURBS_INLINE Normal outward(const JetLanes& j, const SurfacePoint& at, double si
   return n;
 }
 
-// Whether the tangents change so little in a step that the normal turns linearly: not next to a pole.
-NURBS_INLINE bool turns_linearly(const JetLanes& j, const Vec2& d) {
-  const Lane8 length2 = j.x * j.x + j.y * j.y + j.z * j.z;
-  const double uu = d[0] * d[0], vv = d[1] * d[1];
-  constexpr double kTrust = 0.5 * kNormalTrust * kNormalTrust;
-  return uu * length2[3] + vv * length2[4] <= kTrust * length2[1] &&
-         uu * length2[4] + vv * length2[5] <= kTrust * length2[2];
-}
-
 // The normal after a step, not normalised: Weingarten's equations.
 NURBS_INLINE Vec3 turned_normal(const Vec3& n, const Forms& f, const Symmetric& inverse, const Vec2& d) {
   const double hu = f.second.a * d[0] + f.second.b * d[1], hv = f.second.b * d[0] + f.second.c * d[1];
@@ -160,8 +151,8 @@ double misfit2(const Vec3& d, const Vec3& g) {
 NURBS_INLINE bool refine(const PairFrame& pair, JointSolution& s, const Forms& a, const Forms& b,
                          const Steps& steps) {
   PointPair& p = s.points;
-  if (!turns_linearly(s.jet_a, steps.a) || !turns_linearly(s.jet_b, steps.b) || b.first.singular() ||
-      !stays_on_patch(p.on_a, steps.a) || !stays_on_patch(p.on_b, steps.b))
+  if (!turns_linearly(s.jet_a, steps.a[0], steps.a[1]) || !turns_linearly(s.jet_b, steps.b[0], steps.b[1]) ||
+      b.first.singular() || !stays_on_patch(p.on_a, steps.a) || !stays_on_patch(p.on_b, steps.b))
     return false;
   // b.second was taken along A's normal, which is -n_B here up to second order. The normal that turned less
   // is known better: a flat's, or that of much the larger body.

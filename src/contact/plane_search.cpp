@@ -42,7 +42,8 @@ bool solve_warm(const Shape& shape, const Vec3& d, SurfacePoint at, double toler
     const double excess = support_excess(shape, 1, radii_at(shape, at, nullptr, n), d, n);
     const double roundoff = kRoundoff * shape.bounding_radius;
     if (excess <= tolerance &&
-        (d - n).squaredNorm() * shape.bounding_radius <= std::max(tolerance, roundoff)) {
+        (d - n).squaredNorm() * shape.bounding_radius <= std::max(tolerance, roundoff) &&
+        turns_linearly(j, du, dv)) {
       Support& s = out->support;
       out->base = at;
       s.where = next;

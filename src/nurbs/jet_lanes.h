@@ -2,6 +2,7 @@
 #pragma once
 
 #include "nurbs/lanes.h"
+#include "nurbs/tolerances.h"
 
 namespace nurbs {
 
@@ -34,6 +35,16 @@ NURBS_INLINE void place(const Mat3& turn, const Vec3& offset, JetLanes* j) {
 // d . each vector.
 NURBS_INLINE void dot(const JetLanes& j, const Vec3& d, Lane8* out) {
   *out = d[0] * j.x + d[1] * j.y + d[2] * j.z;
+}
+
+// Whether the tangents change so little in a step (du, dv) that the normal turns linearly and the Taylor
+// series is worth its terms: not next to a pole.
+NURBS_INLINE bool turns_linearly(const JetLanes& j, double du, double dv) {
+  const Lane8 length2 = j.x * j.x + j.y * j.y + j.z * j.z;
+  const double uu = du * du, vv = dv * dv;
+  constexpr double kTrust = 0.5 * kNormalTrust * kNormalTrust;
+  return uu * length2[JetLanes::kSuu] + vv * length2[JetLanes::kSuv] <= kTrust * length2[JetLanes::kSu] &&
+         uu * length2[JetLanes::kSuv] + vv * length2[JetLanes::kSvv] <= kTrust * length2[JetLanes::kSv];
 }
 
 // The surface point after a step (du, dv), from the Taylor series.

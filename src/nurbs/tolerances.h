@@ -18,8 +18,10 @@ constexpr int kProjectionSamples = 32;    // starts of the search for the closes
 constexpr int kProjectionSections = 45;   // ... then golden sections: 1/16 of the parameter to 3e-11
 constexpr double kParameterRoundoff = 1e-12;  // a parameter that moves less has been found
 constexpr int kKinkSamples = 17;              // points at which the normals of two sides are compared
-constexpr double kPoleInset = 1e-4;           // parameters from a pole at which its normals are compared
-constexpr double kLeastVolume = 1e-12;        // of the diagonal cubed: less is no body but a surface
+constexpr double kJointSine = 0.01;      // sine between tangents below which normals are not compared ...
+constexpr double kJointSineShare = 0.1;  // ... where it is larger elsewhere on the joint
+constexpr double kPoleInset = 1e-4;      // parameters from a pole at which its normals are compared
+constexpr double kLeastVolume = 1e-12;   // of the diagonal cubed: less is no body but a surface
 
 // --- joints
 constexpr double kNoKink = 1e-7;      // angles between normals below this are no kink: the ball argument then

@@ -474,6 +474,44 @@ TEST(SavedCases, lens_rolls_off_its_pole) {
   }
 }
 
+// Crashed at load: nets of seven rows and more, read as if they were aligned.
+TEST(SavedCases, a_half_ball_of_degree_seven_round_its_pole) {
+  const auto half = saved_shape("shape-half-ball-degree7.json");
+  EXPECT_NEAR(half->mass.volume, 2.0 / 3 * M_PI * std::pow(find_hull_support(*half, Vec3::UnitX()).h, 3),
+              1e-9);
+}
+
+// Refused as dented by half its size: at corners where a patch's tangents are in line, its normal was that of
+// the file's seven digits.
+TEST(SavedCases, a_body_of_seven_digits_whose_corners_have_no_normal_is_accepted) {
+  EXPECT_LT(saved_shape("shape-discs-seven-digits.json")->concavity, 1e-4);
+}
+
+// Half the body's size off it, gap and normal right: next to such a corner a warm contact took a long last
+// step by the Taylor series.
+TEST(SavedCases, warm_plane_contacts_beside_corners_without_a_normal_are_on_the_body) {
+  const auto body = saved_shape("shape-sum-of-discs.json");
+  const Vec3 origin(-0.28527540699325549, 0.33863589026341101, 0.9211559276705148),
+      normal(0.98467911641562289, 0.1724671064451414, 0.025731981839498208);
+  const Particle p{body.get(), 1, Vec3::Zero(),
+                   Quat(0.18490225180023498, -0.24873441953321834, 0.92598833681003234, 0.21561063496605565)};
+  Random random(3);
+  ContactSettings settings;
+  settings.tolerance = 1e-3;
+  for (int k = 0; k < 600; ++k) {
+    double memory[kPairMemorySize] = {0};
+    Particle before = p;
+    before.q = Quat(Eigen::AngleAxisd(random.log_uniform(1e-5, 1e-1), random.direction())) * p.q;
+    find_plane_contact(before, origin, normal, settings, memory);
+    const ContactResult r = find_plane_contact(p, origin, normal, settings, memory);
+    const Vec3 on_body = p.q.conjugate() * r.point_b;
+    for (int i = 0; i < 100; ++i) {
+      const Vec3 e = random.direction();
+      ASSERT_LE(e.dot(on_body) - find_hull_support(*body, e).upper, settings.tolerance) << k;
+    }
+  }
+}
+
 // A body turned over between two calls: the warm start is on the far side.
 TEST(SavedCases, half_turn_between_two_plane_contacts) {
   for (int kind = 0; kind < kKinds; ++kind) {
