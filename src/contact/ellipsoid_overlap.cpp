@@ -14,7 +14,7 @@ namespace {
 constexpr double kShare = 0.5;       // of the tolerance, between the overlap and its level
 constexpr double kMostNoise = 0.1;   // of it, that round-off of a test may take
 constexpr double kNoise = 2e-15;     // of a matrix
-constexpr int kMostTests = 1000;     // 30 to 60 are usual
+constexpr int kMostTests = 200;      // 30 to 60 are usual; the polytope closes in as long
 constexpr int kMostWeights = 100;    // m tried in one
 constexpr double kWidest = 1;        // interval, of the logarithm of the ratio
 constexpr double kNarrowest = 1e-9;  // ... which is none any more

@@ -6,10 +6,16 @@
 #include <cstring>
 #include <utility>
 
-#include "nurbs/lanes.h"
+#include "nurbs/wide.h"
 
 namespace nurbs {
 namespace {
+
+NURBS_INLINE Lane8 load8(const double* from) {
+  Lane8 x;
+  std::memcpy(&x, from, sizeof x);
+  return x;
+}
 
 int count_positive(const Vec3& w) {
   return (w[0] > 0) + (w[1] > 0) + (w[2] > 0);
@@ -246,10 +252,9 @@ GrowingHull::Growth GrowingHull::add(int point, int first, double level) {
 }
 
 double GrowingHull::least_distance2() const {
-  Lane8 least, next;
-  std::memcpy(&least, distance2_, sizeof least);
+  Lane8 least = load8(distance2_);
   for (int k = kSide; k < faces_; k += kSide) {
-    std::memcpy(&next, distance2_ + k, sizeof next);
+    const Lane8 next = load8(distance2_ + k);
     least = next < least ? next : least;
   }
   double best = least[0];
@@ -264,14 +269,18 @@ GrowingHull::Nearest GrowingHull::nearest() {
     const double within = least_distance2() * (1 + kTie);
     Nearest best{-1, kFarAway, behind_ == 0};
     int corners = 0;
-    for (int k = 0; k < faces_; ++k) {
+    const auto look = [&](int k) {
       if (!foot_[k] && !(distance2_[k] > within)) find_foot(k);
-      if (distance2_[k] > within) continue;
+      if (distance2_[k] > within) return;
       const int on = count_positive(face_[k].weights);
-      if (on <= corners) continue;
+      if (on <= corners) return;
       best.face = k;
       best.distance2 = distance2_[k];
       corners = on;
+    };
+    for (int first = 0; first < faces_; first += kSide) {
+      if (none_of(~(load8(distance2_ + first) > within))) continue;
+      for (int k = first; k < std::min(first + kSide, faces_); ++k) look(k);
     }
     if (best.face >= 0 || !(within < kFarAway)) return best;
   }

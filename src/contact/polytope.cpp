@@ -62,7 +62,7 @@ struct Bend {
 
 constexpr int kPointAttempts = 2;         // flat differences of points may have no hull
 constexpr int kBeforeRings = 64;          // queries before rings of directions are looked for
-constexpr int kBentBeforeRings = 192;     // ... of bodies without sharp edges, which caps may do for
+constexpr int kBentBeforeRings = 95;      // ... of bodies without sharp edges, which caps may do for
 constexpr int kAtPoles = 256;             // ... and where the least overlap is along an axis
 constexpr double kPolar = 0.1;            // sine of the angle from it
 constexpr int kMostIdle = 30;             // queries in a row that leave the bracket as it is
