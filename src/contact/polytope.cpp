@@ -60,16 +60,17 @@ struct Bend {
   std::array<double, kStretchCaps.size()> stretch{}, near{};  // the same from finer cells
 };
 
-constexpr int kPointAttempts = 2;         // flat differences of points may have no hull
-constexpr int kBeforeRings = 64;          // queries before rings of directions are looked for
-constexpr int kBentBeforeRings = 95;      // ... of bodies without sharp edges, which caps may do for
-constexpr int kAtPoles = 256;             // ... and where the least overlap is along an axis
-constexpr double kPolar = 0.1;            // sine of the angle from it
-constexpr int kMostIdle = 30;             // queries in a row that leave the bracket as it is
-constexpr double kOneMinimum = 1 - 1e-6;  // cosine above which Newton has come to one minimum again
-constexpr double kFlatBend = 1e-3;        // of the overlap, of its bend along a crease
-constexpr double kCapDepth = 0.4;         // of the tolerance, that a cap proves less than the least overlap
-constexpr double kCapUsed = 0.8;          // of a cap's angle: the rest is for lower minima found later
+constexpr int kPaceFrom = 384, kPaceStep = 128;  // points at which the bracket's width is looked at
+constexpr int kPointAttempts = 2;                // flat differences of points may have no hull
+constexpr int kBeforeRings = 64;                 // queries before rings of directions are looked for
+constexpr int kBentBeforeRings = 95;             // ... of bodies without sharp edges, which caps may do for
+constexpr int kAtPoles = 256;                    // ... and where the least overlap is along an axis
+constexpr double kPolar = 0.1;                   // sine of the angle from it
+constexpr int kMostIdle = 30;                    // queries in a row that leave the bracket as it is
+constexpr double kOneMinimum = 1 - 1e-6;         // cosine above which Newton has come to one minimum again
+constexpr double kFlatBend = 1e-3;               // of the overlap, of its bend along a crease
+constexpr double kCapDepth = 0.4;  // of the tolerance, that a cap proves less than the least overlap
+constexpr double kCapUsed = 0.8;   // of a cap's angle: the rest is for lower minima found later
 constexpr double kWidestCap = 0.42, kLeastCap = 1e-4, kNextCap = 0.75;  // rad
 constexpr double kPlaneBeyond = 4;    // times the least distance, squared: no triangle in it is nearer
 constexpr double kFacing = 1e-6;      // of the smaller body: witnesses may be off each other by
@@ -86,6 +87,24 @@ constexpr int kCorePoints = 320;      // spent on one
 constexpr int kRim = 8;               // points that give away what is outside
 constexpr double kWorthCores = 0.6;   // of the points that the minimum would cost without
 constexpr std::array<double, 8> kCoreCaps = {0.4, 0.25, 0.16, 0.11, 0.075, 0.048, 0.03, 0.015};  // rad
+
+// Brackets that close do so geometrically, if late; those that lose a power of the points only, as along flat
+// valleys, are far from closed when the hull is full.
+class Pace {
+ public:
+  bool is_hopeless(int points, double width, double tolerance) {
+    if (points < next_) return false;
+    const double rate = width / before_, steps = double(kHullVertices - points) / kPaceStep;
+    const bool hopeless = before_ < kFarAway && width * std::pow(rate, steps) > tolerance;
+    before_ = width;
+    next_ = points + kPaceStep;
+    return hopeless;
+  }
+
+ private:
+  int next_ = kPaceFrom;
+  double before_ = kFarAway;
+};
 
 // Everything the search over directions keeps.
 class Search {
@@ -194,12 +213,17 @@ class Search {
   void run(double enough, int most) {
     settle(best_);
     double last = kFarAway, near_before = -kFarAway;
+    Pace pace;
     std::array<short, 3> asked = {-1, -1, -1};
     Vec3 asked_along = Vec3::Zero();
     for (int idle = 0; hull_.points() < most; ++idle) {
       if (lower_caps_) lower_caps();
       const int near = best_face();
       if (near < 0 || upper_ - lower_ <= tolerance_ || lower_ > enough) return;
+      if (!hopeless_ && pace.is_hopeless(hull_.points(), upper_ - lower_, tolerance_)) {
+        hopeless_ = true;  // once
+        return;
+      }
       if (upper_ - lower_ < last || near_ > near_before) idle = 0;
       last = upper_ - lower_;
       near_before = std::max(near_, near_before);
@@ -236,6 +260,8 @@ class Search {
   bool only_points() const { return points_; }
   // Whether round-off ended the search, so that other directions may do better.
   bool stalled() const { return stalled_; }
+  // Whether it was ended because its bracket would not close; it may be gone on with.
+  bool hopeless() const { return hopeless_; }
 
   // What is known so far, without the contact points.
   PolytopeResult bracket() const {
@@ -811,7 +837,7 @@ class Search {
   double lower_ = -kFarAway, upper_ = kFarAway, near_ = -kFarAway;
   Vec3 direction_ = Vec3::UnitX(), direction_to_ask_ = Vec3::UnitX();
   int best_ = 0, queries_ = 0, balances_ = 0, minima_ = 0;
-  bool stalled_ = false, lower_caps_ = false;
+  bool stalled_ = false, hopeless_ = false, lower_caps_ = false;
   int caps_ = 0;
   Cap cap_[kMostMinima];
   Vec3 minimum_[kMostMinima];           // directions surrounded
@@ -842,6 +868,13 @@ __attribute__((noinline)) void make_points_face(const PairFrame& pair, double to
 
 bool has_rings(const Shape& shape) {
   return shape.revolution.found || !shape.round_edges.empty();
+}
+
+// What is left where a hull does not close.
+bool search_last(const PairFrame& pair, double tolerance, PolytopeResult* best) {
+  if (!search_rings(pair, tolerance, true, best) && !search_cells(pair, tolerance, best)) return false;
+  make_points_face(pair, tolerance, best);
+  return true;
 }
 
 }  // namespace
@@ -880,6 +913,11 @@ PolytopeResult solve_polytope(const PairFrame& pair, const Vec3& seed, double to
       }
     }
     if (started) search.run(enough, kHullVertices);
+    if (search.hopeless() && (has_rings(*pair.a) || has_rings(*pair.b))) {
+      best = search.bracket();
+      if (search_last(pair, tolerance, &best)) return best;
+      search.run(enough, kHullVertices);
+    }
     const PolytopeResult result = search.result();
     const int spent = attempt > 0 ? best.iterations : 0;
     if (attempt == 0 || result.bracket.width() < best.bracket.width()) best = result;
@@ -887,9 +925,7 @@ PolytopeResult solve_polytope(const PairFrame& pair, const Vec3& seed, double to
     if (best.converged || best.bracket.lower > enough || (started && !search.stalled())) break;
     from = best.bracket.direction + kHullTurn * (attempt + 1) * Vec3(0.36, -0.48, 0.8);
   }
-  if (!best.converged && !(best.bracket.lower > enough) &&
-      (search_rings(pair, tolerance, true, &best) || search_cells(pair, tolerance, &best)))
-    make_points_face(pair, tolerance, &best);
+  if (!best.converged && !(best.bracket.lower > enough)) search_last(pair, tolerance, &best);
   return best;
 }
 

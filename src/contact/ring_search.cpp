@@ -11,8 +11,9 @@ namespace {
 
 constexpr int kMostCircles = HalfPlaneHull::kMost;  // supports evaluated, one as dear as ...
 constexpr int kCircleCost = 4;                      // ... sectors
-constexpr double kMostSpent = 2400;                 // sectors bounded, some 0.3 us each, and circles
-constexpr double kMostCompared = 1e6;               // circles in their hulls, 2 ns each
+constexpr double kMostSpent = 1000;                 // sectors bounded, some 0.7 us each, and circles ...
+constexpr double kMostSpentLast = 2400;             // ... where nothing else did
+constexpr double kMostCompared = 4e5;               // circles in their hulls, 0.5 ns each
 constexpr double kMostComparedLast = 4e6;           // ... where nothing else did
 constexpr double kFirstSpent = 0.25;                // of either, after which it ends ...
 constexpr double kFirstSpentLast = 0.375;           // ... and where nothing else did
@@ -534,7 +535,8 @@ class RingSearch {
   }
 
   bool close(const Sector& all, bool last) {
-    const double most_compared = last ? kMostComparedLast : kMostCompared,
+    const double most_spent = last ? kMostSpentLast : kMostSpent,
+                 most_compared = last ? kMostComparedLast : kMostCompared,
                  first_spent = last ? kFirstSpentLast : kFirstSpent;
     Sector stack[kDeepestSector + 2];
     int top = 0, sectors = 0;
@@ -543,7 +545,7 @@ class RingSearch {
     proven_ = kFarAway;
     while (top > 0) {
       const double spent =
-          std::max((++sectors + kCircleCost * count_) / kMostSpent, compared_ / most_compared);
+          std::max((++sectors + kCircleCost * count_) / most_spent, compared_ / most_compared);
       if (spent > 1 || (spent > first_spent && closed < kHopeless * spent)) return false;
       Sector& sector = stack[top - 1];
       const double threshold = best_ - kClosedShare * tolerance_;
