@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "body/cube_map.h"
+#include "body/hull_point.h"
 #include "contact/local_bend.h"
 
 namespace nurbs {
@@ -83,6 +84,8 @@ class CellSearch {
         a_(side(*pair.a, pair.scale_a, 1, Mat3::Identity(), Vec3::Zero())),
         b_(side(*pair.b, pair.scale_b, -1, pair.turn, pair.offset)),
         balls_(a_.ball + b_.ball),
+        points_a_(*pair.a, kSupportShare * tolerance / pair.scale_a, 0),
+        points_b_(*pair.b, kSupportShare * tolerance / pair.scale_b, 0),
         noise_(8 * kRoundoff * pair.reach + a_.error + b_.error) {}
 
   bool run(PolytopeResult* result) {
@@ -117,6 +120,9 @@ class CellSearch {
     return s;
   }
 
+  HullPoint hull_point(const Side& s, const Vec3& e) const {
+    return (s.sign > 0 ? points_a_ : points_b_).along(s.turn.transpose() * e);
+  }
   Support support(const Side& s, const Vec3& e) const {
     return find_hull_support(*s.shape, s.turn.transpose() * e, nullptr, kSupportShare * tolerance_ / s.scale);
   }
@@ -147,7 +153,7 @@ class CellSearch {
   }
 
   void circles(const Side& s, const Vec3& e, const Vec3& t, const Vec3& u, double reach, Pieces* out) const {
-    const Support on = support(s, e);
+    const HullPoint on = hull_point(s, e);
     out->upper = s.scale * on.upper + e.dot(s.centre);
     const double cosine = e.dot(s.axis);
     const Vec3 across = e - cosine * s.axis;
@@ -162,7 +168,7 @@ class CellSearch {
     const Vec3 out_of_axis = across / sine, over = cosine * out_of_axis - sine * s.axis;
     for (const double off : {-reach, reach}) {
       const Vec3 other = (e + off * over).normalized();
-      const Support beside = support(s, other);
+      const HullPoint beside = hull_point(s, other);
       circle(s, e, t, u, reach, s.centre + s.scale * (s.turn * beside.point), s.turn * beside.normal, 0, sine,
              out);
     }
@@ -416,7 +422,9 @@ class CellSearch {
   const PairFrame& pair_;
   const double tolerance_;
   const Side a_, b_;
-  const double balls_, noise_;
+  const double balls_;
+  const HullPoints points_a_, points_b_;  // of bodies of revolution: by their meridians
+  const double noise_;
   double best_ = kFarAway;
   Vec3 best_d_ = Vec3::UnitX();
   int cells_ = 0;

@@ -15,6 +15,7 @@ constexpr double kMostSpent = 1000;                 // sectors bounded, some 0.7
 constexpr double kMostSpentLast = 2400;             // ... where nothing else did
 constexpr double kMostCompared = 4e5;               // circles in their hulls, 0.5 ns each
 constexpr double kMostComparedLast = 4e6;           // ... where nothing else did
+constexpr double kAllRings = 1.25;                  // of either, all axes together
 constexpr double kFirstSpent = 0.25;                // of either, after which it ends ...
 constexpr double kFirstSpentLast = 0.375;           // ... and where nothing else did
 constexpr double kHopeless = 0.1;       // ... where less than this times its share of all is closed
@@ -131,7 +132,8 @@ class RingSearch {
              (view_.circles ? view_.scale_m * view_.mate_error : 0.0) + view_.error;
   }
 
-  bool run(bool last, PolytopeResult* result) {
+  // `left`: of what may be spent, less what is.
+  bool run(bool last, double* left, PolytopeResult* result) {
     const Vec3 e = view_.sign * result->bracket.direction;
     const double depth = -kCoreDepth * result->bracket.lower;
     view_.ball = std::min(view_.ball, depth);
@@ -149,7 +151,7 @@ class RingSearch {
       const double angle = M_PI * k / (kFirstAngles - 1);
       query(direction({std::cos(angle), std::sin(angle)}, all.u));
     }
-    if (!close(all, last)) return false;
+    if (!close(all, last, left)) return false;
     fill(result);
     return true;
   }
@@ -534,7 +536,7 @@ class RingSearch {
     return round + least - lost - noise_;
   }
 
-  bool close(const Sector& all, bool last) {
+  bool close(const Sector& all, bool last, double* left) {
     const double most_spent = last ? kMostSpentLast : kMostSpent,
                  most_compared = last ? kMostComparedLast : kMostCompared,
                  first_spent = last ? kFirstSpentLast : kFirstSpent;
@@ -546,7 +548,10 @@ class RingSearch {
     while (top > 0) {
       const double spent =
           std::max((++sectors + kCircleCost * count_) / most_spent, compared_ / most_compared);
-      if (spent > 1 || (spent > first_spent && closed < kHopeless * spent)) return false;
+      if (spent > *left || (spent > first_spent && closed < kHopeless * spent)) {
+        *left -= spent;
+        return false;
+      }
       Sector& sector = stack[top - 1];
       const double threshold = best_ - kClosedShare * tolerance_;
       const Least wide = bound(sector, sector.half, threshold);
@@ -645,7 +650,7 @@ class RingSearch {
 
 // About the axis of K's revolution or, if not null, of these arcs.
 bool search_about(const PairFrame& pair, bool k_is_a, const RoundEdges* arcs, double tolerance, bool last,
-                  PolytopeResult* result) {
+                  double* left, PolytopeResult* result) {
   const Shape &k = k_is_a ? *pair.a : *pair.b, &mate = k_is_a ? *pair.b : *pair.a;
   const double scale = k_is_a ? pair.scale_b : pair.scale_a;
   const bool round = PairFrame::rolling_ball(mate, scale, tolerance) > 0 && !mate.proofs.sphere;
@@ -655,7 +660,8 @@ bool search_about(const PairFrame& pair, bool k_is_a, const RoundEdges* arcs, do
              own = k_is_a ? of_k : Vec3(pair.turn * of_k);
   const bool near = mate.revolution.found && own.cross(axis).norm() < kNearAxis;
   for (const bool core : {false, true})
-    if ((core ? round : near || !round) && RingSearch(pair, k_is_a, core, tolerance, arcs).run(last, result))
+    if ((core ? round : near || !round) &&
+        RingSearch(pair, k_is_a, core, tolerance, arcs).run(last, left, result))
       return true;
   return false;
 }
@@ -663,13 +669,14 @@ bool search_about(const PairFrame& pair, bool k_is_a, const RoundEdges* arcs, do
 }  // namespace
 
 bool search_rings(const PairFrame& pair, double tolerance, bool last, PolytopeResult* result) {
+  double left = kAllRings;
   for (const bool k_is_a : {true, false}) {
     const Shape& k = k_is_a ? *pair.a : *pair.b;
     if (k.revolution.found && !k.proofs.sphere &&
-        search_about(pair, k_is_a, nullptr, tolerance, last, result))
+        search_about(pair, k_is_a, nullptr, tolerance, last, &left, result))
       return true;
     for (const RoundEdges& arcs : k.round_edges)
-      if (search_about(pair, k_is_a, &arcs, tolerance, last, result)) return true;
+      if (search_about(pair, k_is_a, &arcs, tolerance, last, &left, result)) return true;
   }
   return false;
 }
