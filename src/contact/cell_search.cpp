@@ -12,6 +12,8 @@ namespace nurbs {
 namespace {
 
 constexpr int kMostCells = 2400;
+constexpr int kBeforeHopeless = 600;    // of them, after which it ends ...
+constexpr double kHopeless = 0.1;       // ... where less than this times their share of all is closed
 constexpr int kFirstCells = 2;          // per edge of the cube
 constexpr int kDeepest = 26;            // halvings
 constexpr int kPieces = 6;              // of a body that are looked at
@@ -351,8 +353,10 @@ class CellSearch {
           stack[top++] = {face, (2 * i + 1.0) / kFirstCells - 1, (2 * j + 1.0) / kFirstCells - 1,
                           1.0 / kFirstCells};
     const double smallest = 1.0 / kFirstCells / (1 << kDeepest) * 1.5;
+    double closed = 0;  // of the cube's faces
     while (top > 0) {
-      if (++cells > kMostCells) return false;
+      if (++cells > kMostCells || (cells > kBeforeHopeless && closed * kMostCells < kHopeless * cells))
+        return false;
       const Cell cell = stack[--top];
       Vec3 d = from_cube(cell.face, cell.a, cell.b);
       // Within this of the middle: half the diagonal over |d| is the sine of no smaller angle.
@@ -366,7 +370,10 @@ class CellSearch {
       const double threshold = best_ - kClosedShare * tolerance_;
       Vec2 where;
       const double least = bound(d, t, u, reach, a, b, threshold - balls_ + noise_, &where) + balls_ - noise_;
-      if (least >= threshold) continue;
+      if (least >= threshold) {
+        closed += cell.half * cell.half / 6;
+        continue;
+      }
       if (cell.half < 0.2) consider((d + where[0] * t + where[1] * u).normalized());
       if (cell.half < smallest) return false;
       const double half = 0.5 * cell.half;

@@ -888,6 +888,7 @@ PolytopeResult solve_polytope(const PairFrame& pair, const Vec3& seed, double to
     return best;
   Vec3 from = seed;
   bool points = true;
+  double searched = kFarAway;  // the lower end with which all that is left was tried in vain
   for (int attempt = 0; attempt < kHullAttempts; ++attempt) {
     const double joggle = attempt > 0 ? std::min(kJoggle * pair.reach, 0.05 * tolerance) : 0.0;
     Search search(pair, tolerance, joggle, points);
@@ -916,6 +917,7 @@ PolytopeResult solve_polytope(const PairFrame& pair, const Vec3& seed, double to
     if (search.hopeless() && (has_rings(*pair.a) || has_rings(*pair.b))) {
       best = search.bracket();
       if (search_last(pair, tolerance, &best)) return best;
+      searched = best.bracket.lower;
       search.run(enough, kHullVertices);
     }
     const PolytopeResult result = search.result();
@@ -925,7 +927,8 @@ PolytopeResult solve_polytope(const PairFrame& pair, const Vec3& seed, double to
     if (best.converged || best.bracket.lower > enough || (started && !search.stalled())) break;
     from = best.bracket.direction + kHullTurn * (attempt + 1) * Vec3(0.36, -0.48, 0.8);
   }
-  if (!best.converged && !(best.bracket.lower > enough)) search_last(pair, tolerance, &best);
+  if (!best.converged && !(best.bracket.lower > enough) && best.bracket.lower != searched)
+    search_last(pair, tolerance, &best);
   return best;
 }
 
