@@ -32,7 +32,7 @@ NURBS_INLINE Wide load(const double* from) {
   return x;
 }
 
-constexpr WideMask lane_numbers() {
+NURBS_INLINE WideMask lane_numbers() {
   WideMask n{};
   for (int k = 0; k < kWidth; ++k) n[k] = k;
   return n;
