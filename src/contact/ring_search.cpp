@@ -16,11 +16,12 @@ constexpr double kMostSpentLast = 2400;             // ... where nothing else di
 constexpr double kMostCompared = 4e5;               // circles in their hulls, 0.5 ns each
 constexpr double kMostComparedLast = 4e6;           // ... where nothing else did
 constexpr double kAllRings = 1.25;                  // of either, all axes together
-constexpr double kFirstSpent = 0.25;                // of either, after which it ends ...
-constexpr double kFirstSpentLast = 0.375;           // ... and where nothing else did
-constexpr double kHopeless = 0.1;       // ... where less than this times its share of all is closed
-constexpr int kDeepestSector = 60;      // halvings of the azimuth
-constexpr double kNearAxis = 0.2;       // sine between the axes up to which both bodies' circles are used
+constexpr double kOnPace = 9;              // times the share closed, that may be spent where nothing else did
+constexpr double kFirstSpent = 0.25;       // of either, after which it ends ...
+constexpr double kFirstSpentLast = 0.375;  // ... and where nothing else did
+constexpr double kHopeless = 0.1;          // ... where less than this times its share of all is closed
+constexpr int kDeepestSector = 60;         // halvings of the azimuth
+constexpr double kNearAxis = 0.2;          // sine between the axes up to which both bodies' circles are used
 constexpr double kNearlyAlike = 0.1;    // of the body's radius: what directions of a ring may differ by ...
 constexpr double kHardlyAlike = 0.4;    // ... where nothing else did
 constexpr double kClosedShare = 0.9;    // of the tolerance at which a sector is closed ...
@@ -548,7 +549,8 @@ class RingSearch {
     while (top > 0) {
       const double spent =
           std::max((++sectors + kCircleCost * count_) / most_spent, compared_ / most_compared);
-      if (spent > *left || (spent > first_spent && closed < kHopeless * spent)) {
+      const double allowed = last ? std::max(*left, kOnPace * closed) : *left;
+      if (spent > allowed || (spent > first_spent && closed < kHopeless * spent)) {
         *left -= spent;
         return false;
       }

@@ -388,6 +388,12 @@ TEST(SavedCases, creases_that_just_touch) {
   expect_resolved({{"touching-reuleaux-prisms.json", -1.0937e-9}});
 }
 
+// Left unresolved: two tips' rings of directions that nearly are one, of which rings had closed half when
+// they had to end.
+TEST(SavedCases, cones_tip_to_tip_on_nearly_one_axis) {
+  expect_resolved({{"cone-tips-nearly-in-line.json", -1.178e-6}});
+}
+
 // Left unresolved: a cone's part makes a ring of directions alike that is no whole one.
 TEST(SavedCases, flat_valleys_of_sphericons) {
   expect_resolved({{"sphericon-twins.json", -0.0186263492}, {"vertex-in-sphericon.json", -0.013812608}});
