@@ -13,11 +13,6 @@ double square(double x) {
   return x * x;
 }
 
-Angle unit(const Angle& x) {
-  const double length = std::sqrt(square(x.c) + square(x.s));
-  return {x.c / length, x.s / length};
-}
-
 // An angle between `above` and `below` up to which r s + z c, `high` at the one and `low` at the other, is at
 // least `threshold`: it is linear along the chord.
 Angle level_at(const Angle& above, const Angle& below, double high, double low, double threshold) {

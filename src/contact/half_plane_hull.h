@@ -2,6 +2,8 @@
 // the direction along which their convex hull reaches least.
 #pragma once
 
+#include <cmath>
+
 #include "nurbs/wide.h"
 
 namespace nurbs {
@@ -12,6 +14,10 @@ struct Angle {
 };
 inline double cross(const Angle& x, const Angle& y) {
   return x.c * y.s - x.s * y.c;
+}
+inline Angle unit(const Angle& x) {
+  const double length = std::sqrt(x.c * x.c + x.s * x.s);
+  return {x.c / length, x.s / length};
 }
 // Half way between two angles of [0, pi], low first.
 Angle middle(const Angle& low, const Angle& high);

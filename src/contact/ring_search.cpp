@@ -171,7 +171,7 @@ class RingSearch {
     // By `half`, to either side (sign: 1, -1).
     void move(double sign) {
       phi += sign * half;
-      u = {u.c * turn.c - sign * u.s * turn.s, u.s * turn.c + sign * u.c * turn.s};
+      u = unit({u.c * turn.c - sign * u.s * turn.s, u.s * turn.c + sign * u.c * turn.s});
     }
   };
   Sector sector_at(double phi, double half, const Angle& low, const Angle& high, double share) const {
