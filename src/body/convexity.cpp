@@ -154,7 +154,6 @@ class Probe {
   double depth(const SurfacePoint& at) const {
     const LocalForm f = form(at);
     double upper = excess(at);
-    if (!(upper > 0)) return 0;
     // In a shallow dent the hull's plane is tilted by at most about sqrt(2 excess / radius).
     const double tilt = std::min(kWidestTilt, 4 * std::sqrt(2 * upper / shape_.bounding_radius));
     Mat3 axes;

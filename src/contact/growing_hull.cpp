@@ -3,19 +3,10 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstring>
 #include <utility>
-
-#include "nurbs/wide.h"
 
 namespace nurbs {
 namespace {
-
-NURBS_INLINE Lane8 load8(const double* from) {
-  Lane8 x;
-  std::memcpy(&x, from, sizeof x);
-  return x;
-}
 
 int count_positive(const Vec3& w) {
   return (w[0] > 0) + (w[1] > 0) + (w[2] > 0);
@@ -132,7 +123,7 @@ bool GrowingHull::start(int a, int b, int c, int d) {
   faces_ = free_ = behind_ = 0;
   if (volume == 0 || !std::isfinite(volume)) return false;
   if (volume > 0) std::swap(b, c);
-  std::fill(distance2_, distance2_ + kSide, kFarAway);
+  std::fill(distance2_, distance2_ + kWidth, kFarAway);
   set(0, a, b, c);
   set(1, b, a, d);
   set(2, c, b, d);
@@ -219,7 +210,7 @@ bool GrowingHull::fan(int point) {
   short first = -1, previous = -1;
   for (int k = 0; k < edges_; ++k) {
     const Edge& e = edge_[k];
-    if (free_ == 0 && faces_ % kSide == 0) std::fill_n(distance2_ + faces_, kSide, kFarAway);
+    if (free_ == 0 && faces_ % kWidth == 0) std::fill_n(distance2_ + faces_, kWidth, kFarAway);
     const short f = free_ > 0 ? free_list_[--free_] : static_cast<short>(faces_++);
     set(f, e.from, e.to, point);
     face_[f].across = {e.outside, -1, previous};
@@ -252,13 +243,13 @@ GrowingHull::Growth GrowingHull::add(int point, int first, double level) {
 }
 
 double GrowingHull::least_distance2() const {
-  Lane8 least = load8(distance2_);
-  for (int k = kSide; k < faces_; k += kSide) {
-    const Lane8 next = load8(distance2_ + k);
+  Wide least = load_wide(distance2_);
+  for (int k = kWidth; k < faces_; k += kWidth) {
+    const Wide next = load_wide(distance2_ + k);
     least = next < least ? next : least;
   }
   double best = least[0];
-  for (int k = 1; k < kSide; ++k) best = std::min(best, least[k]);
+  for (int k = 1; k < kWidth; ++k) best = std::min(best, least[k]);
   return best;
 }
 
@@ -278,9 +269,9 @@ GrowingHull::Nearest GrowingHull::nearest() {
       best.distance2 = distance2_[k];
       corners = on;
     };
-    for (int first = 0; first < faces_; first += kSide) {
-      if (none_of(~(load8(distance2_ + first) > within))) continue;
-      for (int k = first; k < std::min(first + kSide, faces_); ++k) look(k);
+    for (int first = 0; first < faces_; first += kWidth) {
+      if (none_of(~(load_wide(distance2_ + first) > within))) continue;
+      for (int k = first; k < std::min(first + kWidth, faces_); ++k) look(k);
     }
     if (best.face >= 0 || !(within < kFarAway)) return best;
   }

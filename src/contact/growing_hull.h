@@ -6,6 +6,7 @@
 
 #include "nurbs/tolerances.h"
 #include "nurbs/types.h"
+#include "nurbs/wide.h"
 
 namespace nurbs {
 
@@ -89,9 +90,8 @@ class GrowingHull {
   Vec3 point_[kHullVertices];
   Face face_[kHullFaces];
   // How far a face's nearest point is from the origin, squared; its plane's, which is no more, until that is
-  // asked for (`foot_`); far away of dead ones, and up to the next multiple of kSide.
-  static constexpr int kSide = 8;
-  alignas(64) double distance2_[kHullFaces + kSide];
+  // asked for (`foot_`); far away of dead ones, and up to the next multiple of kWidth.
+  alignas(64) double distance2_[kHullFaces + kWidth];
   bool foot_[kHullFaces];
   int behind_ = 0;  // living faces whose plane has the origin in front of it
   // Of one growth: faces seen, their horizon in order round; numbers of dead faces to give again.

@@ -1,17 +1,10 @@
 // A walk along the plane hull (Jarvis 1973) with the comparisons side by side; see half_plane_hull.h.
 #include "contact/half_plane_hull.h"
 
-#include <cmath>
-#include <cstring>
-
 #include "nurbs/tolerances.h"
 
 namespace nurbs {
 namespace {
-
-double square(double x) {
-  return x * x;
-}
 
 // An angle between `above` and `below` up to which r s + z c, `high` at the one and `low` at the other, is at
 // least `threshold`: it is linear along the chord.
@@ -19,12 +12,6 @@ Angle level_at(const Angle& above, const Angle& below, double high, double low, 
   if (!(above.c * below.c + above.s * below.s > 0 && high > threshold && threshold > 0)) return above;
   const double t = (high - threshold) / (high - low);
   return unit({above.c + t * (below.c - above.c), above.s + t * (below.s - above.s)});
-}
-
-NURBS_INLINE Wide load(const double* from) {
-  Wide x;
-  std::memcpy(&x, from, sizeof x);
-  return x;
 }
 
 NURBS_INLINE WideMask lane_numbers() {
@@ -37,7 +24,7 @@ NURBS_INLINE WideMask lane_numbers() {
 
 Angle middle(const Angle& low, const Angle& high) {
   Angle sum{low.c + high.c, low.s + high.s};
-  if (square(sum.c) + square(sum.s) < 1)
+  if (sum.c * sum.c + sum.s * sum.s < 1)
     sum = {high.s - low.s, low.c - high.c};  // square to their difference
   return unit(sum);
 }
@@ -46,7 +33,7 @@ int HalfPlaneHull::highest(const Angle& e) const {
   Wide most = Wide{} - kFarAway;
   WideMask best = WideMask{}, number = lane_numbers();
   for (int k = 0; k < count_; k += kWidth, number += kWidth) {
-    const Wide h = load(r_ + k) * e.s + load(z_ + k) * e.c;
+    const Wide h = load_wide(r_ + k) * e.s + load_wide(z_ + k) * e.c;
     const WideMask higher = (h > most) & (number < count_);
     most = select(higher, h, most);
     best = higher ? number : best;
@@ -63,7 +50,7 @@ int HalfPlaneHull::corner_after(int top, const Angle& now, double noise, Angle* 
   WideMask best = WideMask{} - 1, number = lane_numbers(), level = WideMask{};
   for (int k = 0; k < count_; k += kWidth, number += kWidth) {
     // Where a point comes above `top`.
-    const Wide c = load(r_ + k) - rt, s = zt - load(z_ + k);
+    const Wide c = load_wide(r_ + k) - rt, s = zt - load_wide(z_ + k);
     const Wide turn = now.c * s - now.s * c;
     const WideMask later = turn > noise;
     level |= ~later & (turn > -noise) & (now.c * c + now.s * s > noise);

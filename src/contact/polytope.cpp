@@ -72,11 +72,11 @@ constexpr double kFlatBend = 1e-3;               // of the overlap, of its bend 
 constexpr double kCapDepth = 0.4;  // of the tolerance, that a cap proves less than the least overlap
 constexpr double kCapUsed = 0.8;   // of a cap's angle: the rest is for lower minima found later
 constexpr double kWidestCap = 0.42, kLeastCap = 1e-4, kNextCap = 0.75;  // rad
-constexpr double kPlaneBeyond = 4;    // times the least distance, squared: no triangle in it is nearer
-constexpr double kFacing = 1e-6;      // of the smaller body: witnesses may be off each other by
-constexpr double kFacingShare = 0.1;  // of the tolerance, that better ones are to be off
-constexpr int kMostFacing = 96;       // points spent on better ones
-constexpr double kOffNormal = 1e-6;   // rad, given away for round-off
+constexpr double kPlaneBeyond = 4;     // times the least distance, squared: no triangle in it is nearer
+constexpr double kFacing = 1e-6;       // of the smaller body: witnesses may be off each other by
+constexpr double kFacingBetter = 0.1;  // of that, that better ones are to be off
+constexpr int kMostFacing = 96;        // points spent on better ones
+constexpr double kOffNormal = 1e-6;    // rad, given away for round-off
 // A cap whose bodies are cut to their cores about it, below.
 constexpr double kOffSupport = 1e-4;  // rad
 constexpr int kBeforeCores = 96;      // points before that is tried ...
@@ -772,7 +772,7 @@ class Search {
   void refine_pair(Vec3* a, Vec3* b) {
     for (int k = 0; k < kMostFacing; ++k) {
       const Facing near = find_nearest_pair(a, b);
-      if (near.off <= std::max(0.1 * kFacing * pair_.size, roundoff()) || near.face < 0) return;
+      if (near.off <= std::max(kFacingBetter * kFacing * pair_.size, roundoff()) || near.face < 0) return;
       const int v = query(near.towards.normalized(), closest_of(hull_.face(near.face), direction_));
       if (v < 0 || hull_.grow(v, 0.0, near.face) != GrowingHull::Growth::grown) return;
     }

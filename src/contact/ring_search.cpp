@@ -93,8 +93,7 @@ struct Circle {
   Vec3 middle;  // M's point, or the centre of its circle, from M's centre ...
   Vec3 k;       // ... and from K's `point`
   double rm;    // radius of that circle
-  Angle at;     // angle from the axis it was asked for ...
-  Vec3 e;       // ... and the direction
+  Angle at;     // angle from the axis it was asked for
   Vec3 nk, nm;  // the surfaces' own normals there, outward from K and into M
   Vec3 on_k;    // K's point, from `point`: of a circle, or an arc of one; or, `lone`, no other is known
   bool lone = false;
@@ -147,7 +146,7 @@ class RingSearch {
     on_m_ = last_m_;
     const double alike = differ() / (view_.scale_k * view_.k->bounding_radius);
     if (!(alike < (last ? kHardlyAlike : kNearlyAlike))) return false;
-    const Sector all = sector_at(azimuth(e), M_PI, {1, 0}, {-1, 0}, 1);
+    const Sector all = sector_at(azimuth(e), M_PI);
     for (int k = 0; k < kFirstAngles; ++k) {
       const double angle = M_PI * k / (kFirstAngles - 1);
       query(direction({std::cos(angle), std::sin(angle)}, all.u));
@@ -174,8 +173,9 @@ class RingSearch {
       u = unit({u.c * turn.c - sign * u.s * turn.s, u.s * turn.c + sign * u.c * turn.s});
     }
   };
-  Sector sector_at(double phi, double half, const Angle& low, const Angle& high, double share) const {
-    Sector s{phi, half, low, high, share, {std::cos(phi), std::sin(phi)}, {1, 0}};
+  // Of all angles.
+  static Sector sector_at(double phi, double half) {
+    Sector s{phi, half, {1, 0}, {-1, 0}, 1, {std::cos(phi), std::sin(phi)}, {1, 0}};
     s.set_half(half);
     return s;
   }
@@ -222,7 +222,6 @@ class RingSearch {
     c.r = view_.across(c.on_k).norm();
     c.lone = view_.arcs && !on_arcs(c);
     c.at = {view_.axis.dot(e), view_.across(e).norm()};
-    c.e = e;
     c.nk = view_.turn_k * k.normal;
     c.nm = view_.turn_m * -m.normal;
     c.middle = xm;
@@ -321,21 +320,29 @@ class RingSearch {
     return rate * half * r;
   }
 
-  // |e x b| for e at an angle in the half plane of u, and the point of M's unit circle that faces e. From
-  // cross products: 1 - (e.b)^2 would lose the digits where the axes are nearly one.
+  // M's axis in the axes of an azimuth: u, a x u and a.
+  Vec3 mate_axis_from(const Angle& u) const {
+    const double x = tangent_.dot(view_.mate_axis), y = second_.dot(view_.mate_axis);
+    return {x * u.c + y * u.s, y * u.c - x * u.s, view_.axis.dot(view_.mate_axis)};
+  }
+  // |e x b| for e at an angle in the half plane of an azimuth, and the point of M's unit circle that faces e,
+  // in that azimuth's axes as b is. From cross products: 1 - (e.b)^2 would lose the digits where the axes are
+  // nearly one.
   struct Facing {
     double sine;
     Vec3 point;
   };
-  Facing facing(const Angle& at, const Vec3& u) const {
-    const Vec3 cross = (at.s * u + at.c * view_.axis).cross(view_.mate_axis);
+  static Facing facing(const Angle& at, const Vec3& b) {
+    const Vec3 cross = Vec3(at.s, 0, at.c).cross(b);
     const double sine = cross.norm();
-    return {sine, view_.mate_axis.cross(cross) / sine};
+    return {sine, b.cross(cross) / sine};
   }
 
+  // Whether the circles are known for azimuths within `half` of phi.
+  bool reaches(double phi, double half) const { return !view_.arcs || view_.arcs->holds(phi, half); }
   // A circle as far as it goes: beyond the azimuths of an arc its point alone.
   Circle known(const Circle& c, double phi, double half) const {
-    if (!view_.arcs || (!c.lone && view_.arcs->holds(phi, half))) return c;
+    if (!c.lone && reaches(phi, half)) return c;
     Circle alone = c;
     alone.lone = true;
     alone.r = alone.z = 0;
@@ -348,27 +355,23 @@ class RingSearch {
     const Angle &u = sector.u, turn = half > 0 ? sector.turn : Angle{1, 0};
     const Reach over = reach_of(sector);
     const double lost = over.sine > view_.tilt ? turned(over, half, 1) / over.sine : 0;
-    const bool on_arcs = !view_.arcs || view_.arcs->holds(sector.phi, half);
-    const Vec3& b = view_.mate_axis;
-    const double bx = tangent_.dot(b), by = second_.dot(b), bz = view_.axis.dot(b);
+    const bool reaches = this->reaches(sector.phi, half);
+    const Vec3 b = mate_axis_from(u);
     hull_.clear();
     for (int i = 0; i < chosen_; ++i) {
       const FlatCircle& c = flat_[which_[i]];
-      const Flat& k = on_arcs && !c.lone ? c.whole : c.alone;
+      const Flat& k = reaches && !c.lone ? c.whole : c.alone;
       const double along = k.x * u.c + k.y * u.s, across = k.y * u.c - k.x * u.s;
       // The most of it over the interval.
       const bool inside = half >= M_PI || along >= turn.c * k.length;
       const double reach =
           half > 0 ? (inside ? k.length : along * turn.c + std::abs(across) * turn.s) : along;
       double r = k.r - reach, z = k.z;
-      if (c.rm > 0) {  // the tangent of M's circle that faces e
-        const double ex = c.at.s * u.c, ey = c.at.s * u.s, ez = c.at.c;
-        const double x = ey * bz - ez * by, y = ez * bx - ex * bz, w = ex * by - ey * bx,
-                     sine = std::sqrt(x * x + y * y + w * w);
-        if (sine > kNoDirection) {
-          const double rm = c.rm / sine, px = by * w - bz * y, py = bz * x - bx * w, pz = bx * y - by * x;
-          r += rm * (px * u.c + py * u.s) - c.rm * lost;
-          z += rm * pz;
+      if (c.rm > 0) {
+        const Facing m = facing(c.at, b);
+        if (m.sine > kNoDirection) {  // else the tangent plane 0
+          r += c.rm * (m.point[0] - lost);
+          z += c.rm * m.point[2];
         }
       }
       hull_.add(r, z);
@@ -490,16 +493,16 @@ class RingSearch {
     Facing m{1, Vec3::Zero()};
     double turned = 0;
     if (view_.circles) {
-      m = facing(here.at, u);
-      turned = s * m.point.dot(across);
+      m = facing(here.at, mate_axis_from(sector.u));
+      turned = s * m.point[1];
       if (!(over.across > 0.5 * over.sine)) return -kFarAway;
     }
     struct Slope {
       double q, t, f;
     };
     const auto slope = [&](const Circle& circle) {
-      const double ps = circle.r - circle.k.dot(u) + circle.rm * m.point.dot(u),
-                   pc = circle.z - circle.k.dot(view_.axis) + circle.rm * m.point.dot(view_.axis),
+      const double ps = circle.r - circle.k.dot(u) + circle.rm * m.point[0],
+                   pc = circle.z - circle.k.dot(view_.axis) + circle.rm * m.point[2],
                    f = circle.rm * turned - s * circle.k.dot(across);
       return Slope{ps * s + pc * c, ps * c - pc * s, f};
     };
@@ -583,8 +586,7 @@ class RingSearch {
           sector.high = other.low = middle(sector.low, sector.high);
         } else {
           sector.set_half(0.5 * sector.half);
-          other.half = sector.half;
-          other.turn = sector.turn;
+          other = sector;
           sector.move(-1);
           other.move(1);
         }
@@ -605,7 +607,7 @@ class RingSearch {
     r->converged = true;
     r->points.na = d;
     r->points.nb = -d;
-    const Sector there = sector_at(azimuth(best_e_), 0, {1, 0}, {-1, 0}, 0);
+    const Sector there = sector_at(azimuth(best_e_), 0);
     const Least least = bound(there, 0, -kFarAway);
     // The circles level there, so weighted that the witnesses face each other.
     const auto slope = [&](int k) { return hull_.r(k) * least.at.c - hull_.z(k) * least.at.s; };

@@ -41,6 +41,11 @@ using Wide = Lane4;
 #endif
 using WideMask = Mask<Wide>;
 
+NURBS_INLINE Wide load_wide(const double* from) {
+  Wide x;
+  std::memcpy(&x, from, sizeof x);
+  return x;
+}
 NURBS_INLINE double select(bool mask, double yes, double no) {
   return mask ? yes : no;
 }

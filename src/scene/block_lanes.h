@@ -10,9 +10,7 @@ constexpr int kUnique = kLocalModelSize - 1;  // field of a block
 
 // Numbers of a field, and of three and more from there on.
 NURBS_INLINE Wide lanes(const ContactBlock& block, int field, int first) {
-  Wide w;
-  std::memcpy(&w, &block.field[field][first], sizeof w);
-  return w;
+  return load_wide(&block.field[field][first]);
 }
 NURBS_INLINE Triple<Wide> lanes3(const ContactBlock& block, int field, int first) {
   return {lanes(block, field, first), lanes(block, field + 1, first), lanes(block, field + 2, first)};

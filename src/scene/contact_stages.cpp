@@ -602,11 +602,7 @@ void ContactStages::release(ContactBlock& block, int lane, double lower) {
 // Stages (e) and (f) for the contacts first to first + kWidth - 1.
 template <bool ledger>
 void ContactStages::apply_law(ContactBlock& block, int first, const Results& results) {
-  const auto got = [first](const double(&from)[kBlock]) {
-    Wide w;
-    std::memcpy(&w, &from[first], sizeof w);
-    return w;
-  };
+  const auto got = [first](const double(&from)[kBlock]) { return load_wide(&from[first]); };
   const Wide zero{};
   const WideMask touching = got(results.touching) != 0.0;
   if (none_of(touching)) return;
