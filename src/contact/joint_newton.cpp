@@ -179,6 +179,20 @@ bool close_enough(const Bracket& bracket, double tolerance, double size) {
   return bracket.width() <= tolerance && bracket.angle2 * size <= std::max(tolerance, kRoundoff * size);
 }
 
+// Next to a dent, whose allowance keeps the bracket open: the points after the step would close it but for
+// that, so that only the supports along their normal are left to confirm. Else the points stay.
+NURBS_INLINE bool settles(const PairFrame& pair, JointSolution& s, const Forms& a, const Forms& b,
+                          const Steps& steps, double tolerance) {
+  if (!s.dented || !(s.bracket.angle2 * pair.size <= tolerance)) return false;
+  const PointPair before = s.points;
+  if (refine(pair, s, a, b, steps)) {
+    s.gap = s.normal.dot(s.points.b - s.points.a);
+    if (s.bracket.upper - s.gap <= 0.5 * tolerance) return true;
+  }
+  s.points = before;
+  return false;
+}
+
 // Proven apart, and the bound is at most a third short of the distance: good enough to budget motion with.
 bool far_enough(const Bracket& bracket, double enough) {
   return bracket.lower > enough && bracket.width() <= 0.5 * (bracket.lower - enough);
@@ -237,8 +251,13 @@ JointSolution solve_joint(const PairFrame& pair, const SurfacePoint& on_a, const
     out.stationary = !out.converged && is_stationary(pair, p);
     const Forms a(out.jet_a, p.na), b(out.jet_b, p.na);
     const Steps steps = newton_step(p, out.jet_a, a, b);
+    const bool smooth = steps.regular && !na.polar && !nb.polar;
+    if (!out.converged && !out.stationary && smooth && settles(pair, out, a, b, steps, tolerance)) {
+      out.stationary = true;
+      return out;
+    }
     if (out.converged || out.stationary) {
-      const bool refined = steps.regular && !na.polar && !nb.polar && refine(pair, out, a, b, steps);
+      const bool refined = smooth && refine(pair, out, a, b, steps);
       if (!refined) out.normal = out.converged ? out.bracket.direction : Vec3((p.na - p.nb).normalized());
       out.gap = out.normal.dot(p.b - p.a);
       if (out.converged) out.gap = std::clamp(out.gap, out.bracket.lower, out.bracket.upper);

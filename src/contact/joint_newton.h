@@ -17,7 +17,8 @@ struct JointSolution {
   int iterations;  // Newton systems solved
   bool converged =
       false;  // bracket no wider than the tolerance asked for, or the gap proven larger than `enough`
-  bool stationary = false;  // a common normal within kStationary, certified or not
+  bool stationary = false;  // a common normal within kStationary, or what the last step makes one of next to
+                            // a dent, certified or not
 
   // Converged at points found in another way, after `solved` more systems. Their bracket is along the normal.
   void set_met(const PointPair& at, const Bracket& along, int solved);

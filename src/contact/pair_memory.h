@@ -15,7 +15,8 @@ namespace nurbs {
 // A surface point.
 struct PointMemory {
   double patch, u, v;  // patch < 0: none
-  double step[2];      // how far it went from the solve before, in (u, v); 0 across patches
+  float step[2];       // how far it went from the solve before, in (u, v); 0 across patches
+  float change[2];     // how much further than from the one before that; 0 where not a small share
 };
 
 // Empty when proof.stamp is 0; then nothing else means anything. proof.contact: whether the last solve could
@@ -38,7 +39,7 @@ inline void drop_model(LocalModel* model) {
 }
 
 // Whether something else stands in a model's place, which its `unique` then says: kDeepProof (deep_search.h),
-// kEllipsoidPair (ellipsoid_search.h), kBridge (crease_search.h).
+// kEllipsoidPair (ellipsoid_search.h), kBridge (bridge_search.h).
 inline bool is_mark(double unique) {
   return unique < 0 && std::isfinite(unique);
 }
@@ -57,7 +58,7 @@ inline SurfacePoint surface_point(const PointMemory& m) {
   return {static_cast<int>(m.patch), m.u, m.v};
 }
 inline PointMemory point_memory(const SurfacePoint& at) {
-  return {static_cast<double>(at.patch), at.u, at.v, {0, 0}};
+  return {static_cast<double>(at.patch), at.u, at.v, {0, 0}, {0, 0}};
 }
 
 // Whether there is such a point: there is none at first, and a caller's memory may be of another shape.
@@ -65,16 +66,25 @@ inline bool lies_on(const Shape& shape, const SurfacePoint& at) {
   return at.patch >= 0 && at.patch < static_cast<int>(shape.patches.size());
 }
 
-// Where a surface point would be had it moved on as it last did; if that leaves the patch, where it was.
+// Where a surface point would be had it moved on as it last did, its step changing as it last did; if that
+// leaves the patch, where it was.
 inline SurfacePoint warm_point(const PointMemory& m, const Shape& shape) {
-  const SurfacePoint last = surface_point(m), next{last.patch, m.u + m.step[0], m.v + m.step[1]};
+  const SurfacePoint last = surface_point(m),
+                     next{last.patch, m.u + (m.step[0] + m.change[0]), m.v + (m.step[1] + m.change[1])};
   if (!lies_on(shape, last)) return {};
   return next.on_patch() ? next : last;
 }
 inline void remember_point(const SurfacePoint& now, PointMemory* m) {
   const PointMemory last = *m;
   *m = point_memory(now);
-  if (last.patch == m->patch) m->step[0] = m->u - last.u, m->step[1] = m->v - last.v;
+  if (last.patch != m->patch) return;
+  const float du = m->u - last.u, dv = m->v - last.v, ddu = du - last.step[0], ddv = dv - last.step[1];
+  m->step[0] = du;
+  m->step[1] = dv;
+  constexpr float kSmall = 0.5;  // more is no change of a steady motion
+  if (!(ddu * ddu + ddv * ddv <= kSmall * kSmall * (du * du + dv * dv))) return;
+  m->change[0] = ddu;
+  m->change[1] = ddv;
 }
 
 inline CoarsePoint coarse(const PointMemory& m) {
@@ -85,7 +95,7 @@ inline CoarsePoint coarse(const PointMemory& m) {
 }
 inline PointMemory fine(const CoarsePoint& c) {
   constexpr double kSteps = 65535;
-  return {c.patch == 65535 ? -1.0 : c.patch, c.u / kSteps, c.v / kSteps, {0, 0}};
+  return {c.patch == 65535 ? -1.0 : c.patch, c.u / kSteps, c.v / kSteps, {0, 0}, {0, 0}};
 }
 
 // Whether the local model's answer is good enough for the force, on its patches, and shallow enough to be the

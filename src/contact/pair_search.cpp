@@ -5,6 +5,7 @@
 #include <cstring>
 #include <limits>
 
+#include "contact/bridge_search.h"
 #include "contact/crease_search.h"
 #include "contact/deep_search.h"
 #include "contact/direction_search.h"

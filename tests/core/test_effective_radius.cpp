@@ -106,7 +106,7 @@ TEST(EffectiveRadius, FlatFacesCreasesAndCylinders) {
   EXPECT_DOUBLE_EQ(sphere_curvatures(plane_curvature(), face, up, cap, true).b, 1 / cap);
   const Vec3 corner = Vec3(1, 1, 1).normalized();
   EXPECT_FALSE(curvature_at(box, point_of(box, corner), corner).known);
-  EXPECT_FALSE(curvature_at(box, PointMemory{-1, 0, 0, {0, 0}}, corner).known);
+  EXPECT_FALSE(curvature_at(box, PointMemory{-1, 0, 0, {0, 0}, {0, 0}}, corner).known);
   // What is remembered of a face may be its corner, as a point of another patch; the answer goes by the
   // normal.
   for (double patch = -1; patch < 6; ++patch)
@@ -114,7 +114,7 @@ TEST(EffectiveRadius, FlatFacesCreasesAndCylinders) {
       for (const double v : {0.0, 1.0})
         for (const double angle : {0.0, 0.02, 0.1}) {
           const Vec3 leaning(std::sin(angle), 0, std::cos(angle));
-          const SurfaceCurvature c = curvature_at(box, PointMemory{patch, u, v, {0, 0}}, leaning);
+          const SurfaceCurvature c = curvature_at(box, PointMemory{patch, u, v, {0, 0}, {0, 0}}, leaning);
           EXPECT_EQ(c.known, angle * angle < kCreaseAngle2) << patch << ": " << angle;
           EXPECT_LT(c.tensor.norm(), 1e-12);
         }

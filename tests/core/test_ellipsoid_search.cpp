@@ -176,8 +176,8 @@ TEST(EllipsoidSearch, curvature_is_that_of_the_surface) {
     for (int k = 0; k < 30; ++k) {
       const Particle p{body.get(), random.uniform(0.5, 2), Vec3::Zero(), random.turn()};
       const Support s = find_hull_support(*body, random.direction());
-      const PointMemory point{static_cast<double>(s.where.patch), s.where.u, s.where.v, {0, 0}},
-          none{-1, 0, 0, {0, 0}};
+      const PointMemory point{static_cast<double>(s.where.patch), s.where.u, s.where.v, {0, 0}, {0, 0}},
+          none{-1, 0, 0, {0, 0}, {0, 0}};
       const Vec3 outward = p.q * s.normal;
       const SurfaceCurvature closed = curvature_at(p, none, outward),
                              measured = curvature_at(p, point, outward);

@@ -84,7 +84,7 @@ TEST(SphereSearch, pairs_of_spheres) {
       EXPECT_NEAR(r.normal.dot(r.point_b - r.point_a), r.gap, allowed);
       EXPECT_NEAR(r.point_a.norm(), radius_a, allowed);
     }
-    PointMemory none{-1, 0, 0, {0, 0}};
+    PointMemory none{-1, 0, 0, {0, 0}, {0, 0}};
     const SurfaceCurvature c = curvature_at(a, none, n);
     ASSERT_TRUE(c.known);
     const Vec3 t = n.unitOrthogonal();

@@ -1,0 +1,34 @@
+// The certificate of certificate.h at two hull supports along one direction, with balls that touch there from
+// inside.
+#pragma once
+
+#include "contact/certificate.h"
+#include "contact/pair_frame.h"
+
+namespace nurbs {
+
+// A ball that touches at a point from inside, lab lengths; `normal` outward there, shape axes.
+struct TouchingBall {
+  double radius;  // 0: none is known
+  Vec3 normal;
+};
+
+// At a surface point whose unit normal is `normal`; none where that is not `along`, the direction that the
+// point is a support of (both shape axes).
+inline TouchingBall touching_ball(const PairFrame& pair, const Shape& shape, const SurfacePoint& at,
+                                  const Vec3& normal, double scale, const Vec3& along) {
+  const bool met = (normal - along).squaredNorm() <= kStationary * kStationary;
+  return {met ? std::min(scale * rolling_radii(shape, at, normal).inner, pair.reach) : 0, normal};
+}
+
+// The bracket at points p.a, p.b of the hulls whose supports along d are at most `upper` = p(d).
+inline Bracket bracket_along(const PairFrame& pair, const Vec3& d, double upper, const PointPair& p,
+                             const TouchingBall& a, const TouchingBall& b) {
+  const Vec3 core = (p.b - b.radius * (pair.turn * b.normal)) - (p.a - a.radius * a.normal);
+  const double slack = pair.scale_a * pair.a->joint_slack + pair.scale_b * pair.b->joint_slack;
+  const double unique = a.radius + b.radius;
+  const double most = core.dot(d) > 0 ? core.norm() - unique + slack + kRoundoff * pair.reach : kFarAway;
+  return {-upper, most, d, 0, unique};
+}
+
+}  // namespace nurbs
