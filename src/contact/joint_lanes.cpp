@@ -1,6 +1,8 @@
 // See joint_lanes.h; the formulas are joint_newton.cpp's and certificate.h's.
 #include "contact/joint_lanes.h"
 
+#include <algorithm>
+
 #include "body/shape.h"
 #include "contact/certificate.h"
 #include "nurbs/tolerances.h"
@@ -189,6 +191,19 @@ struct Parameters {
   }
 };
 
+// Closes the bracket of a lane that a dent's allowance keeps open, by the hulls' supports; false where they
+// don't.
+bool confirm(int l, JointLanes* pairs) {
+  const Vec3 d = lane(pairs->normal, l);
+  const double lower = d.dot(lane(pairs->offset, l)) - confirmed_heights(pairs->side_a(l), pairs->side_b(l));
+  if (lower > pairs->lower[l]) {
+    pairs->lower[l] = lower;
+    set_lane(triple(d), l, &pairs->direction);
+  }
+  pairs->gap[l] = std::clamp(pairs->gap[l], pairs->lower[l], pairs->upper[l]);
+  return pairs->upper[l] - pairs->lower[l] <= pairs->tolerance[l];
+}
+
 }  // namespace
 
 unsigned follow_joints(unsigned asked, double enough, JointLanes* pairs) {
@@ -213,7 +228,7 @@ unsigned follow_joints(unsigned asked, double enough, JointLanes* pairs) {
   radius_a *= pairs->scale_a;
   radius_b *= pairs->scale_b;
 
-  unsigned open = asked, found = 0;
+  unsigned open = asked, found = 0, failed = 0;
   for (int k = 0; k < kFollowedIterations && open != 0; ++k) {
     for (int l = 0; l < kWidth; ++l) {
       if (!(open >> l & 1)) continue;
@@ -251,11 +266,16 @@ unsigned follow_joints(unsigned asked, double enough, JointLanes* pairs) {
     const Wide noise = kRoundoff * pairs->reach;
     const WideMask nearer =
         misfit2(normal, at_b - at_a) <= kNearer2 * misfit2(a.normal, b.at.s - a.at.s) + noise * noise;
-    const WideMask done = usual & close & nearer & first_b.regular() &
-                          turns_linearly(a.at, first_a, step.au, step.av) &
-                          turns_linearly(b.at, first_b, step.bu, step.bv);
-
+    const WideMask refined = usual & nearer & first_b.regular() &
+                             turns_linearly(a.at, first_a, step.au, step.av) &
+                             turns_linearly(b.at, first_b, step.bu, step.bv);
     const Wide gap = dot(normal, at_b - at_a);
+    unsigned dented = 0;
+    for (int l = 0; l < kWidth; ++l) dented |= static_cast<unsigned>(pairs->dented[l]) << l;
+    // Closed but for what a dent may hide.
+    const WideMask settled = mask_of(dented) & ~close & (bracket.angle2 * pairs->size <= tolerance) &
+                             (bracket.upper - gap <= 0.5 * tolerance);
+    const WideMask done = refined & (close | settled);
     const auto keep = [&done](const auto& now, auto* kept) { *kept = select(done, now, *kept); };
     keep(normal, &pairs->normal);
     keep(at_a, &pairs->point_a);
@@ -265,7 +285,7 @@ unsigned follow_joints(unsigned asked, double enough, JointLanes* pairs) {
     keep(bracket.lower, &pairs->lower);
     keep(bracket.upper, &pairs->upper);
     keep(bracket.unique, &pairs->unique);
-    const unsigned now = bits_of(done);
+    const unsigned now = bits_of(done), unproven = bits_of(done & settled);
     for (int l = 0; l < kWidth; ++l) {
       if (!(now >> l & 1)) continue;
       pairs->base_a[l] = pairs->on_a[l];
@@ -274,12 +294,13 @@ unsigned follow_joints(unsigned asked, double enough, JointLanes* pairs) {
       pairs->on_a[l].v = next.av[l];
       pairs->on_b[l].u = next.bu[l];
       pairs->on_b[l].v = next.bv[l];
+      if ((unproven >> l & 1) && !confirm(l, pairs)) failed |= 1u << l;
     }
     found |= now;
-    open = bits_of(usual & ~close);
+    open = bits_of(usual & ~close & ~done);
     at = next;
   }
-  return found;
+  return found & ~failed;
 }
 
 }  // namespace nurbs

@@ -8,6 +8,7 @@
 #include "contact/bridge_search.h"
 #include "contact/crease_search.h"
 #include "contact/deep_search.h"
+#include "contact/dents.h"
 #include "contact/direction_search.h"
 #include "contact/ellipsoid_search.h"
 #include "contact/flat_search.h"
@@ -138,14 +139,19 @@ class Ladder {
     return true;
   }
 
+  static NormalSide side_a(const PairFrame& pair, const JointSolution& s) {
+    return {*pair.a, pair.scale_a, s.normal, s.points.on_a};
+  }
+  static NormalSide side_b(const PairFrame& pair, const JointSolution& s) {
+    return {*pair.b, pair.scale_b, pair.direction_on_b(s.normal), s.points.on_b};
+  }
+
   // A common normal of bodies with dents is certified by the hulls' supports along it.
   bool confirm(const PairFrame& pair, double tolerance, JointSolution& s) const {
     const double excess = pair.scale_a * pair.a->support_excess + pair.scale_b * pair.b->support_excess;
     if (!s.stationary || excess <= 0.1 * tolerance || s.bracket.width() > 2 * excess + tolerance)
       return false;
-    const Support a = confirm_support(*pair.a, s.normal, s.points.on_a),
-                  b = confirm_support(*pair.b, pair.direction_on_b(s.normal), s.points.on_b);
-    const double p = pair.overlap_along(s.normal, a.upper, b.upper);
+    const double p = confirmed_heights(side_a(pair, s), side_b(pair, s)) - s.normal.dot(pair.offset);
     if (-p > s.bracket.lower) {
       s.bracket.lower = -p;
       s.bracket.direction = s.normal;
@@ -402,22 +408,8 @@ class Ladder {
     const ModelSide b{*pair.b,     pair.scale_b, s.base_b, s.jet_b, pair.turn.transpose(),
                       pair.offset, turned2_b};
     if (!is_worth_a_model(a, b, s.gap, settings_.tolerance, pair.size)) return;
-    const double turn = s.dented ? turn_to_rival(pair, s) : kNormalMargin;
+    const double turn = s.dented ? turn_to_rival(side_a(pair, s), side_b(pair, s)) : kNormalMargin;
     make_local_model(a, b, 0.5 * s.bracket.unique, turn, &memory_.model);
-  }
-
-  // Turn of the normal, rad, until another support point of a body with dents may take over. Two supports
-  // differ by at most the diameter times the turn more than they did.
-  static double turn_to_rival(const PairFrame& pair, const JointSolution& s) {
-    const auto clear = [](const Shape& shape, const Vec3& d, const SurfacePoint& at) {
-      const Support own = confirm_support(shape, d, at);
-      Support rival;
-      return find_rival(shape, d, own, &rival) ? std::max(0.0, own.h - rival.h) / shape.bounding_radius
-                                               : std::numeric_limits<double>::infinity();
-    };
-    const double least = std::min(clear(*pair.a, s.normal, s.points.on_a),
-                                  clear(*pair.b, pair.direction_on_b(s.normal), s.points.on_b));
-    return std::min(0.25 * least, kNormalMargin);
   }
 
   const Particle &a_, &b_;
