@@ -280,6 +280,7 @@ void measure(Draft& draft) {
   s.support_excess = dent.excess + s.joint_slack;
   s.core = find_sphero_polyhedron(s);
   if (!s.revolution.found && s.joint_slack == 0) s.round_edges = find_round_edges(s);
+  s.edge_curves = find_edge_curves(s);
   s.rates = std::move(bounds.rates);
   s.joints = measure_joint_distance(s);
   s.normal_map = make_normal_map(s, &bounds);

@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "body/direction_atlas.h"
+#include "body/edge_curves.h"
 #include "body/ellipsoid.h"
 #include "body/flat_faces.h"
 #include "body/inner_map.h"
@@ -175,6 +176,7 @@ struct Shape {
   ProfileRadii profile_radii;           // of that
   SpheroPolyhedron core;                // hull of points, and a ball, that the body is, if it is one
   std::vector<RoundEdges> round_edges;  // none of bodies of revolution
+  EdgeCurves edge_curves;               // of sharp edges
   FlatFeatures flats;                   // faces, creases and ruled lines; empty for round bodies
 
   // Balls inside the body over directions, which spare deep contacts of round bodies a search. Made the first

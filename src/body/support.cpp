@@ -321,6 +321,14 @@ double support_slack(const Shape& shape) {
   return kSupportSlack * kRoundoff * shape.bounding_radius;
 }
 
+// No point of the body is higher along d; infinite where that takes a search.
+double height_of_core(const Shape& shape, const Vec3& d) {
+  const SpheroPolyhedron& core = shape.core;
+  return core.found() ? d.dot(core.points[core.support(d)]) + core.radius + core.error +
+                            kRoundoff * shape.bounding_radius
+                      : std::numeric_limits<double>::infinity();
+}
+
 // Over all patches.
 void raise_all(const Shape& shape, const Vec3& d, Highest* top) {
   const double slack = support_slack(shape);
@@ -403,7 +411,8 @@ bool find_on_meridian(const Shape& shape, const Vec3& d, const SurfacePoint* sta
 Support find_support(const Shape& shape, const Vec3& d, const SurfacePoint* start) {
   start = if_on_body(shape, start);
   if (Support s; find_on_meridian(shape, d, start, &s)) return s;
-  const Support local = begin(shape, d, start);
+  Support local = begin(shape, d, start);
+  local.upper = std::min(local.upper, std::max(local.h, height_of_core(shape, d)));
   if (is_certain(shape, local, 0) || (shape.dented() && std::isfinite(local.upper))) return local;
   return search_patches(shape, d, local, cell_of(shape, d));
 }
@@ -413,9 +422,15 @@ Support find_hull_support(const Shape& shape, const Vec3& d, const SurfacePoint*
   start = if_on_body(shape, start);
   if (Support s; find_on_meridian(shape, d, start, &s)) return s;
   Support local = begin(shape, d, start, flat);
+  local.upper = std::min(local.upper, std::max(local.h, height_of_core(shape, d)));
   if (!is_certain(shape, local, enough) && local.slope > kSlopeTolerance && std::isfinite(local.upper))
     local = climb(shape, d, local.where);
+  local.upper = std::min(local.upper, std::max(local.h, height_of_core(shape, d)));
   return is_certain(shape, local, enough) ? local : search_patches(shape, d, local, cell_of(shape, d));
+}
+
+Support find_feature_support(const Shape& shape, const Vec3& d, const SurfacePoint* start) {
+  return find_hull_support(shape, d, start, kFeatureSupport * shape.bounding_radius);
 }
 
 Support search_all_patches(const Shape& shape, const Vec3& d, const SurfacePoint& at) {
@@ -433,12 +448,13 @@ Support look_at(const Shape& shape, const Vec3& d, const SurfacePoint& at) {
   return s;
 }
 
-Support confirm_support(const Shape& shape, const Vec3& d, const SurfacePoint& at) {
+Support confirm_support(const Shape& shape, const Vec3& d, const SurfacePoint& at, double enough) {
   Support s;
   const Normal normal = set_point(shape, d, at, &s);
   s.upper = s.h + excess_at(shape, d, at, normal) + kRoundoff * shape.bounding_radius;
+  s.upper = std::min(s.upper, std::max(s.h, height_of_core(shape, d)));
   s.converged = true;
-  if (is_certain(shape, s, 0)) return s;
+  if (is_certain(shape, s, enough)) return s;
   if (Support found; find_on_meridian(shape, d, &at, &found)) return found;
   return search_patches(shape, d, s, cell_of(shape, d));
 }

@@ -35,14 +35,18 @@ Support find_support(const Shape& shape, const Vec3& d, const SurfacePoint* star
 Support find_hull_support(const Shape& shape, const Vec3& d, const SurfacePoint* start = nullptr,
                           double enough = 0, double flat = kSlopeTolerance);
 
+// The same within kFeatureSupport of the body's size: bodies of rounded digits, whose joints leave a few
+// round-offs more open than others', would be searched for those.
+Support find_feature_support(const Shape& shape, const Vec3& d, const SurfacePoint* start = nullptr);
+
 // The same from every patch, knowing no more than the height of one point: slow, for tables and tests.
 Support search_all_patches(const Shape& shape, const Vec3& d, const SurfacePoint& at);
 
 // A point that has d as its normal, or nearly, taken for the support: with no bound. 50 ns.
 Support look_at(const Shape& shape, const Vec3& d, const SurfacePoint& at);
 
-// The same knowing a point that has d as its normal, or nearly.
-Support confirm_support(const Shape& shape, const Vec3& d, const SurfacePoint& at);
+// The hull's support within `enough`, knowing a point that has d as its normal, or nearly.
+Support confirm_support(const Shape& shape, const Vec3& d, const SurfacePoint& at, double enough = 0);
 
 // Of a body with dents: the best other local maximum reached from the corners of d's atlas cell, which lie on
 // either side of the groove that d bridges; false if there is none.

@@ -121,7 +121,7 @@ double turn_to_ruled_line(const Shape& shape, const SurfacePoint& where, const V
 
 SupportSet support_set(const Shape& shape, const Vec3& d, double tolerance) {
   const FlatFeatures& flats = shape.flats;
-  const Support support = find_hull_support(shape, d);
+  const Support support = find_feature_support(shape, d);
   SupportSet set;
   set.where = support.where;
   set.h = support.h;

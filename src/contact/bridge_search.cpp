@@ -6,6 +6,7 @@
 #include <optional>
 
 #include "body/support_turn.h"
+#include "contact/dents.h"
 #include "contact/support_bracket.h"
 
 namespace nurbs {
@@ -185,9 +186,9 @@ bool meet_bridge(const PairFrame& pair, const Vec3& direction, double tolerance,
       points.b = at.of_a ? y : met;
       points.on_a = at.of_a ? nearer : at.one.where();
       points.on_b = at.of_a ? at.one.where() : nearer;
-      const Support a = confirm_support(*pair.a, d, points.on_a),
-                    b = confirm_support(*pair.b, on_b.d, points.on_b);
-      const double upper = pair.overlap_along(d, a.upper, b.upper);
+      const double upper = confirmed_heights({*pair.a, pair.scale_a, d, points.on_a},
+                                             {*pair.b, pair.scale_b, on_b.d, points.on_b}, tolerance) -
+                           d.dot(pair.offset);
       const auto ball_at = [&](const Branch& of, bool of_a) {
         return of_a ? touching_ball(pair, *pair.a, of.where(), of.normal(), pair.scale_a, on_a.d)
                     : touching_ball(pair, *pair.b, of.where(), of.normal(), pair.scale_b, on_b.d);

@@ -17,11 +17,14 @@ struct NormalSide {
   SurfacePoint at;
 };
 
-// h_A(d) + h_B(-d) at most, searched over the hulls, lengths of the lab. 0.1 us for each body, 0.4 us where a
-// dent is near.
-inline double confirmed_heights(const NormalSide& a, const NormalSide& b) {
-  return a.scale * confirm_support(a.shape, a.d, a.at).upper +
-         b.scale * confirm_support(b.shape, b.d, b.at).upper;
+// h_A(d) + h_B(-d) at most, of the hulls, right to kSupportShare of `tolerance`; lengths of the lab. 0.1 us for
+// each body, 0.4 us where a dent is near.
+inline double confirmed_heights(const NormalSide& a, const NormalSide& b, double tolerance) {
+  const auto height = [tolerance](const NormalSide& side) {
+    return side.scale *
+           confirm_support(side.shape, side.d, side.at, kSupportShare * tolerance / side.scale).upper;
+  };
+  return height(a) + height(b);
 }
 
 // Turn of the normal, rad, until another support point may take over. Two supports differ by at most the

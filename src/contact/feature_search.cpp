@@ -197,7 +197,7 @@ struct Cuts {
 
 FeatureGap gap_along(const Particle& particle, const Vec3& a, const Vec3& d, const SurfacePoint* start) {
   const Mat3 axes = particle.q.toRotationMatrix();
-  const Support s = find_hull_support(*particle.shape, axes.transpose() * -d, start);
+  const Support s = find_feature_support(*particle.shape, axes.transpose() * -d, start);
   FeatureGap g;
   g.on_body = axes * (particle.scale * s.point);
   g.gap = d.dot(particle.x - a) - particle.scale * s.h;

@@ -195,7 +195,8 @@ struct Parameters {
 // don't.
 bool confirm(int l, JointLanes* pairs) {
   const Vec3 d = lane(pairs->normal, l);
-  const double lower = d.dot(lane(pairs->offset, l)) - confirmed_heights(pairs->side_a(l), pairs->side_b(l));
+  const double lower = d.dot(lane(pairs->offset, l)) -
+                       confirmed_heights(pairs->side_a(l), pairs->side_b(l), pairs->tolerance[l]);
   if (lower > pairs->lower[l]) {
     pairs->lower[l] = lower;
     set_lane(triple(d), l, &pairs->direction);

@@ -81,7 +81,7 @@ inline void remember_point(const SurfacePoint& now, PointMemory* m) {
   const float du = m->u - last.u, dv = m->v - last.v, ddu = du - last.step[0], ddv = dv - last.step[1];
   m->step[0] = du;
   m->step[1] = dv;
-  constexpr float kSmall = 0.5;  // more is no change of a steady motion
+  constexpr float kSmall = 0.25;  // more is no change of a steady motion
   if (!(ddu * ddu + ddv * ddv <= kSmall * kSmall * (du * du + dv * dv))) return;
   m->change[0] = ddu;
   m->change[1] = ddv;

@@ -10,6 +10,7 @@
 #include "contact/deep_search.h"
 #include "contact/dents.h"
 #include "contact/direction_search.h"
+#include "contact/edge_search.h"
 #include "contact/ellipsoid_search.h"
 #include "contact/flat_search.h"
 #include "contact/joint_newton.h"
@@ -111,7 +112,9 @@ class Ladder {
 
   // Rung 4: Newton from where the contact would be, had it moved on as it last did.
   bool warm(const PairFrame& pair, double tolerance, ContactResult* r) {
-    if (meet_on_flat(pair, tolerance, r) || stay_on_bridge(pair, tolerance, r)) return true;
+    if (meet_on_flat(pair, tolerance, r) || stay_on_bridge(pair, tolerance, r) ||
+        stay_on_edge(pair, tolerance, r))
+      return true;
     JointSolution s = solve_joint(pair, warm_point(memory_.on_a, *pair.a), warm_point(memory_.on_b, *pair.b),
                                   tolerance, settings_.reach, kWarmIterations);
     r->iterations = s.iterations;
@@ -151,7 +154,7 @@ class Ladder {
     const double excess = pair.scale_a * pair.a->support_excess + pair.scale_b * pair.b->support_excess;
     if (!s.stationary || excess <= 0.1 * tolerance || s.bracket.width() > 2 * excess + tolerance)
       return false;
-    const double p = confirmed_heights(side_a(pair, s), side_b(pair, s)) - s.normal.dot(pair.offset);
+    const double p = confirmed_heights(side_a(pair, s), side_b(pair, s), tolerance) - s.normal.dot(pair.offset);
     if (-p > s.bracket.lower) {
       s.bracket.lower = -p;
       s.bracket.direction = s.normal;
@@ -159,6 +162,18 @@ class Ladder {
     s.converged = s.bracket.width() <= tolerance;
     if (s.converged) s.gap = std::clamp(s.gap, s.bracket.lower, s.bracket.upper);
     return s.converged;
+  }
+
+  // The sharp edges or the vertex that the contact lay on the last time.
+  bool stay_on_edge(const PairFrame& pair, double tolerance, ContactResult* r) {
+    if ((pair.a->smooth && pair.b->smooth) || !has_proof(memory_.proof)) return false;
+    JointSolution s;
+    s.iterations = 0;
+    s.points.on_a = warm_point(memory_.on_a, *pair.a);
+    s.points.on_b = warm_point(memory_.on_b, *pair.b);
+    if (!meet_edges(pair, last_direction(pair), tolerance, settings_.tolerance, &s)) return false;
+    *r = finish(pair, s, s.normal, Rung::warm, s.iterations);
+    return true;
   }
 
   // A contact on a crease or over a dent, where the surfaces have no common normal.

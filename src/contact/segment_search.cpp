@@ -37,8 +37,8 @@ void set_points(const PairFrame& pair, const Vec3& a, const Vec3& b, PolytopeRes
   r->points.a = a;
   r->points.b = b;
   part_points(r);
-  r->points.on_a = find_hull_support(*pair.a, r->points.na).where;
-  r->points.on_b = find_hull_support(*pair.b, pair.direction_on_b(r->points.na)).where;
+  r->points.on_a = find_feature_support(*pair.a, r->points.na).where;
+  r->points.on_b = find_feature_support(*pair.b, pair.direction_on_b(r->points.na)).where;
 }
 
 }  // namespace

@@ -165,6 +165,8 @@ constexpr double kConcaveShare = 1e-3;  // of the second derivatives that the mi
 constexpr int kConcaveSteps = 8;        // of Newton in a concave box
 constexpr double kConcaveRest = 1e-6;   // of the slack: what the gradient left may hide
 constexpr double kSupportSlack = 2;     // round-offs of a body that its support may lack
+constexpr double kFeatureSupport =
+    1e-13;  // of a body: what points of contact polygons, lines and edges may lack of its support
 
 // --- where supports lie near dents
 constexpr int kSupportCells = 64;             // per cube edge, as the normal map's
