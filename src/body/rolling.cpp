@@ -29,6 +29,7 @@ double inscribed(const Shape& shape, double cover) {
 }
 
 constexpr double kSineOfOne = 0.84;
+constexpr double kNarrow = 0.1;  // of the bounding radius: patches whose width says little
 
 }  // namespace
 
@@ -50,6 +51,8 @@ JointDistance measure_joint_distance(const Shape& shape) {
     joints.width = std::min({joints.width, least[0], least[1]});
     joints.speed.push_back(speed);
   }
+  if (!joints.none() && joints.width < kNarrow * shape.bounding_radius)
+    joints.segments = find_kink_segments(shape);
   return joints;
 }
 
@@ -64,6 +67,10 @@ RollingRadii rolling_radii(const Shape& shape, const SurfacePoint& at, const Vec
   const double parameter[4] = {at.u, 1 - at.u, at.v, 1 - at.v};
   for (int edge = 0; edge < 4; ++edge)
     if (speed[edge] < kInfinity) s = std::min(s, speed[edge] * std::max(0.0, parameter[edge]));
+  if (!joints.segments.empty()) {
+    const BezierPatch& on = shape.patches[at.patch];
+    s = std::max(s, joints.segments.distance(at.patch, evaluate0(on, at.u, at.v)));
+  }
   const double r0 = patch.min_radius;
   RollingRadii radii{std::min(r0, inscribed(shape, kSineOfOne * std::min(s, r0))), patch.max_radius,
                      shape.support_excess, near};

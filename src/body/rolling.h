@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "body/direction_atlas.h"
+#include "body/kink_segments.h"
 
 namespace nurbs {
 
@@ -19,12 +20,13 @@ struct JointDistance {
   double width = 0;    // least width of a patch: no kinked joint beyond a smooth one is nearer than this
   double convex = 0;   // largest kink that opens, rad
   double concave = 0;  // largest kink that closes, rad
+  KinkSegments segments;  // where the width is next to nothing; else empty
   bool none() const { return convex == 0 && concave == 0; }
 };
 template <class Archive>
 void archive(Archive& a, JointDistance& s) {
-  auto& [speed, width, convex, concave] = s;
-  a(speed, width, convex, concave);
+  auto& [speed, width, convex, concave, segments] = s;
+  a(speed, width, convex, concave, segments);
 }
 
 // At a surface point x with outward normal n:

@@ -6,6 +6,7 @@
 
 #include "body/support.h"
 #include "nurbs/tolerances.h"
+#include "nurbs/wide.h"
 
 namespace nurbs {
 
@@ -16,6 +17,12 @@ struct NormalSide {
   Vec3 d;
   SurfacePoint at;
 };
+
+// Whether what dents may hide of a contact, `excess`, keeps its bracket open.
+template <class Real>
+NURBS_INLINE Mask<Real> dents_count(const Real& excess, const Real& tolerance) {
+  return excess > 0.1 * tolerance;
+}
 
 // h_A(d) + h_B(-d) at most, of the hulls, right to kSupportShare of `tolerance`; lengths of the lab. 0.1 us for
 // each body, 0.4 us where a dent is near.

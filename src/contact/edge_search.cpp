@@ -31,14 +31,16 @@ bool opens(const EdgeLink& link) {
   return link.kink > kSmoothKink;
 }
 
-Feature feature_at(const Shape& shape, const SurfacePoint& at) {
+// Puts a point that is all but on a sharp edge there.
+Feature feature_at(const Shape& shape, SurfacePoint* at) {
   Feature f;
   if (shape.smooth) return f;
-  const double end[4] = {at.u, 1 - at.u, at.v, 1 - at.v};
+  const double end[4] = {at->u, 1 - at->u, at->v, 1 - at->v};
   for (int edge = 0; edge < 4; ++edge) {
-    if (end[edge] > 0) continue;
-    const EdgeLink& link = shape.links[at.patch][edge];
+    if (end[edge] > kOnEdge) continue;
+    const EdgeLink& link = shape.links[at->patch][edge];
     if (!opens(link)) continue;
+    (edge < 2 ? at->u : at->v) = edge % 2;
     f.freedom = link.collapsed ? 0 : f.freedom - 1;
     f.edge = edge;
     if (f.freedom == 0) break;
@@ -265,8 +267,8 @@ Side side_at(const Shape& shape, double scale, const SurfacePoint& at) {
   Side side;
   side.shape = &shape;
   side.scale = scale;
-  side.feature = feature_at(shape, at);
   side.at = at;
+  side.feature = feature_at(shape, &side.at);
   return side;
 }
 
@@ -331,7 +333,8 @@ bool meet(const PairFrame& pair, Side a, Side b, const Vec3& direction, double t
 }  // namespace
 
 bool is_on_edge(const Shape& shape, const SurfacePoint& at) {
-  return feature_at(shape, at).freedom < 2;
+  SurfacePoint there = at;
+  return feature_at(shape, &there).freedom < 2;
 }
 
 bool meet_edges(const PairFrame& pair, const Vec3& direction, double tolerance, double tilt,

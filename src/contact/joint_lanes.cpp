@@ -274,7 +274,8 @@ unsigned follow_joints(unsigned asked, double enough, JointLanes* pairs) {
     unsigned dented = 0;
     for (int l = 0; l < kWidth; ++l) dented |= static_cast<unsigned>(pairs->dented[l]) << l;
     // Closed but for what a dent may hide.
-    const WideMask settled = mask_of(dented) & ~close & (bracket.angle2 * pairs->size <= tolerance) &
+    const WideMask settled = mask_of(dented) & dents_count<Wide>(a.slack + b.slack, tolerance) & ~close &
+                             (bracket.angle2 * pairs->size <= tolerance) &
                              (bracket.upper - gap <= 0.5 * tolerance);
     const WideMask done = refined & (close | settled);
     const auto keep = [&done](const auto& now, auto* kept) { *kept = select(done, now, *kept); };

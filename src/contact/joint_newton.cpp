@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "contact/dents.h"
+
 namespace nurbs {
 namespace {
 
@@ -183,7 +185,9 @@ bool close_enough(const Bracket& bracket, double tolerance, double size) {
 // that, so that only the supports along their normal are left to confirm. Else the points stay.
 NURBS_INLINE bool settles(const PairFrame& pair, JointSolution& s, const Forms& a, const Forms& b,
                           const Steps& steps, double tolerance) {
-  if (!s.dented || !(s.bracket.angle2 * pair.size <= tolerance)) return false;
+  const double excess = pair.scale_a * pair.a->support_excess + pair.scale_b * pair.b->support_excess;
+  if (!s.dented || !dents_count(excess, tolerance) || !(s.bracket.angle2 * pair.size <= tolerance))
+    return false;
   const PointPair before = s.points;
   if (refine(pair, s, a, b, steps)) {
     s.gap = s.normal.dot(s.points.b - s.points.a);

@@ -152,7 +152,7 @@ class Ladder {
   // A common normal of bodies with dents is certified by the hulls' supports along it.
   bool confirm(const PairFrame& pair, double tolerance, JointSolution& s) const {
     const double excess = pair.scale_a * pair.a->support_excess + pair.scale_b * pair.b->support_excess;
-    if (!s.stationary || excess <= 0.1 * tolerance || s.bracket.width() > 2 * excess + tolerance)
+    if (!s.stationary || !dents_count(excess, tolerance) || s.bracket.width() > 2 * excess + tolerance)
       return false;
     const double p = confirmed_heights(side_a(pair, s), side_b(pair, s), tolerance) - s.normal.dot(pair.offset);
     if (-p > s.bracket.lower) {
