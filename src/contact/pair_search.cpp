@@ -5,6 +5,7 @@
 #include <cstring>
 #include <limits>
 
+#include "body/locate_point.h"
 #include "contact/bridge_search.h"
 #include "contact/crease_search.h"
 #include "contact/deep_search.h"
@@ -337,6 +338,12 @@ class Ladder {
                                                       : r;
   }
 
+  // The hull's points are where the bodies meet, but its places only have the same supports: for the next step.
+  static void locate(const PairFrame& pair, PointPair* p) {
+    p->on_a = locate_point(*pair.a, p->on_a, p->a / pair.scale_a);
+    p->on_b = locate_point(*pair.b, p->on_b, pair.turn.transpose() * (p->b - pair.offset) / pair.scale_b);
+  }
+
   // The polytope brackets the global answer; a stationary point that lies inside its bracket is a better
   // estimate of points and normal than the polytope's own.
   ContactResult bracket(const PairFrame& pair, const JointSolution* known, const Vec3& seed, double tolerance,
@@ -355,8 +362,10 @@ class Ladder {
       spent += again.iterations;
       if (again.bracket.width() < hull.bracket.width()) hull = again;
     }
-    if (hull.converged && (hull.closed || of_points(pair, tolerance)))
+    if (hull.converged && (hull.closed || of_points(pair, tolerance))) {
+      locate(pair, &hull.points);
       return finish(pair, hull, hull.bracket.direction, Rung::fallback, spent);
+    }
     JointSolution joint;
     bool polished = false;
     if (known && known->gap <= hull.bracket.upper && known->gap >= hull.bracket.lower - tolerance) {
@@ -378,6 +387,8 @@ class Ladder {
       hull.bracket.direction = joint.normal;
       hull.bracket.lower = lower;
       hull.gap = gap;
+    } else {
+      locate(pair, &hull.points);
     }
     hull.converged = hull.bracket.width() <= tolerance;
     return finish(pair, hull, hull.bracket.direction, Rung::fallback, spent);

@@ -1,0 +1,71 @@
+// See locate_point.h.
+#include "body/locate_point.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "body/support.h"
+
+namespace nurbs {
+namespace {
+
+constexpr double kLocated = 1e-7;
+constexpr double kNearEdge = 1e-4;  // of a patch's parameters
+constexpr int kIterations = 8;
+
+double miss(const Shape& shape, const SurfacePoint& at, const Vec3& x) {
+  return (evaluate0(shape.patches[at.patch], at.u, at.v) - x).norm();
+}
+
+// Along an edge of the patch.
+SurfacePoint on_edge(const Shape& shape, SurfacePoint at, int edge, const Vec3& x) {
+  (edge < 2 ? at.u : at.v) = edge % 2;
+  double& t = edge < 2 ? at.v : at.u;
+  for (int k = 0; k < kIterations; ++k) {
+    const Jet1 j = evaluate1(shape.patches[at.patch], at.u, at.v);
+    const Vec3& along = edge < 2 ? j.sv : j.su;
+    const double length2 = along.squaredNorm();
+    if (!(length2 > 0)) break;
+    const double last = t;
+    t = std::clamp(t + along.dot(x - j.s) / length2, 0.0, 1.0);
+    if (std::abs(t - last) <= kOnEdge) break;
+  }
+  return at;
+}
+
+// On a sharp edge that is near, if x lies on it.
+bool on_sharp_edge(const Shape& shape, const SurfacePoint& at, double near, const Vec3& x, double allowed,
+                   SurfacePoint* found) {
+  const double end[4] = {at.u, 1 - at.u, at.v, 1 - at.v};
+  for (int edge = 0; edge < 4; ++edge) {
+    const EdgeLink& link = shape.links[at.patch][edge];
+    if (end[edge] > near || link.collapsed || !(link.kink > kSmoothKink)) continue;
+    *found = on_edge(shape, at, edge, x);
+    if (miss(shape, *found, x) <= allowed) return true;
+  }
+  return false;
+}
+
+}  // namespace
+
+SurfacePoint locate_point(const Shape& shape, const SurfacePoint& start, const Vec3& x) {
+  const double allowed = kLocated * shape.bounding_radius;
+  SurfacePoint at = start, found;
+  if (on_sharp_edge(shape, at, kOnEdge, x, allowed, &found)) return found;
+  for (int k = 0; k < kIterations; ++k) {
+    const Jet1 j = evaluate1(shape.patches[at.patch], at.u, at.v);
+    const Vec3 r = x - j.s;
+    const double e = j.su.squaredNorm(), f = j.su.dot(j.sv), g = j.sv.squaredNorm(), area2 = e * g - f * f;
+    if (!(area2 > kSingularMetric * e * g)) break;
+    const double ru = r.dot(j.su), rv = r.dot(j.sv);
+    const double du = std::clamp((g * ru - f * rv) / area2, -1.0, 1.0),
+                 dv = std::clamp((e * rv - f * ru) / area2, -1.0, 1.0);
+    if (std::max(std::abs(du), std::abs(dv)) <= kOnEdge) break;
+    const SurfacePoint next{at.patch, at.u + du, at.v + dv};
+    at = next.on_patch() ? next : walk(shape, at, du, dv);
+  }
+  if (!(miss(shape, at, x) <= allowed)) return start;
+  return on_sharp_edge(shape, at, kNearEdge, x, allowed, &found) ? found : at;
+}
+
+}  // namespace nurbs
