@@ -30,6 +30,15 @@ double inscribed(const Shape& shape, double cover) {
 
 constexpr double kSineOfOne = 0.84;
 constexpr double kNarrow = 0.1;  // of the bounding radius: patches whose width says little
+constexpr double kSharp = 0.05;  // ... and balls that local bounds may replace by larger ones
+
+// Ball that touches at a point, by what is known of the surface around it on its patch.
+double local_ball(const Shape& shape, const SurfacePoint& at) {
+  if (shape.rates.empty()) return 0;  // while the body is made
+  const LocalRate here = rate_near(shape.rates[at.patch], at);
+  const double least = std::min(here.least, shape.bounding_radius);
+  return std::min(least, inscribed(shape, kSineOfOne * std::min(here.room, least)));
+}
 
 }  // namespace
 
@@ -60,7 +69,11 @@ RollingRadii rolling_radii(const Shape& shape, const SurfacePoint& at, const Vec
   const JointDistance& joints = shape.joints;
   const CurvatureBounds& patch = shape.patch_curvature;
   const double near = shape.normal_map.cells > 0 ? shape.normal_map.radius_at(normal) : kInfinity;
-  if (joints.none()) return {patch.min_radius, patch.max_radius, shape.support_excess, near};
+  if (joints.none()) {
+    const bool sharp = patch.min_radius < kSharp * shape.bounding_radius;
+    return {sharp ? std::max(patch.min_radius, local_ball(shape, at)) : patch.min_radius, patch.max_radius,
+            shape.support_excess, near};
+  }
   const std::array<double, 4>& speed = joints.speed[at.patch];
   // 0 * infinity is not a number: an edge at parameter distance 0 that is smooth must not count.
   double s = joints.width;
@@ -79,6 +92,7 @@ RollingRadii rolling_radii(const Shape& shape, const SurfacePoint& at, const Vec
     if (joints.convex > 0) across_kinks = std::min(across_kinks, 0.25 * s / joints.convex);
     radii.inner = std::max(radii.inner, across_kinks);
   }
+  if (radii.inner < kSharp * shape.bounding_radius) radii.inner = std::max(radii.inner, local_ball(shape, at));
   if (joints.concave > 0) {
     const bool clear = s >= patch.max_radius * joints.concave;
     radii.outer = clear ? 2 * patch.max_radius : kInfinity;

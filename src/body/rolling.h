@@ -68,6 +68,9 @@ JointDistance measure_joint_distance(const Shape& shape);
 //     corner: not checked). In a normal section the ball of radius r <= r0/2 drops v^2 / (2 r) below the
 //     tangent plane at distance v and the surface at most v^2 / (2 r0) + 4 kink (v - s), so r <= s / (4 kink)
 //     suffices; and t as above with the width for s.
+// Either holds with the least radius of the surface around x as far as that is known (LocalRate::room), taken
+// for s: a body that bends sharply elsewhere has larger balls.
+//
 // Likewise a closing kink stays inside the ball of radius 2 P0 once s >= P0 kink; nearer, the surface may
 // rise by shape.support_excess. `near` is the normal map's. A few ns.
 RollingRadii rolling_radii(const Shape& shape, const SurfacePoint& at, const Vec3& normal);

@@ -84,13 +84,14 @@ struct PatchRate {
                                                           // around, W the map from turns of the normal to
                                                           // displacements; a length
     float speed_u = 0, speed_v = 0;  // a path there that changes u by du is at least speed_u |du| long
+    float least = 0;                 // no curvature radius there is smaller
   };
   std::vector<Cell> cells;  // v fastest
 };
 template <class Archive>
 void archive(Archive& a, PatchRate::Cell& s) {
-  auto& [rate, speed_u, speed_v] = s;
-  a(rate, speed_u, speed_v);
+  auto& [rate, speed_u, speed_v, least] = s;
+  a(rate, speed_u, speed_v, least);
 }
 template <class Archive>
 void archive(Archive& a, PatchRate& s) {
@@ -98,10 +99,10 @@ void archive(Archive& a, PatchRate& s) {
   a(cells);
 }
 
-// At a surface point: the rate holds as long as the point moves by less than `room`, a length. Infinite and 0
-// where nothing is proven: at poles, flats, inflections.
+// At a surface point: the rate, and the least curvature radius, hold as long as the point moves by less than
+// `room`, a length. Infinite and 0 where nothing is proven: at poles, flats, inflections.
 struct LocalRate {
-  double rate, room;
+  double rate, room, least;
 };
 LocalRate rate_near(const PatchRate& patch, const SurfacePoint& at);
 

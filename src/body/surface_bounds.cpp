@@ -613,7 +613,7 @@ class Bounder {
     constexpr int n = kRateCells;
     PatchRate::Cell none;
     none.rate = 0;
-    none.speed_u = none.speed_v = std::numeric_limits<float>::infinity();
+    none.speed_u = none.speed_v = none.least = std::numeric_limits<float>::infinity();
     out_.rates.resize(patches_);
     for (PatchRate& r : out_.rates) r.cells.assign(n * n, none);
     const auto up = [](double x) {
@@ -637,6 +637,7 @@ class Bounder {
           cell.rate = std::max(cell.rate, up(b.rate));
           cell.speed_u = std::min(cell.speed_u, down(b.speed_u / fastest_u));
           cell.speed_v = std::min(cell.speed_v, down(b.speed_v / fastest_v));
+          cell.least = std::min(cell.least, down(b.min_radius));
         }
     }
   }
@@ -662,7 +663,7 @@ LocalRate rate_near(const PatchRate& patch, const SurfacePoint& at) {
   const double across_u = std::min(at.u - std::max(i - 1.0, 0.0) / n, std::min(i + 2.0, 1.0 * n) / n - at.u),
                across_v = std::min(at.v - std::max(j - 1.0, 0.0) / n, std::min(j + 2.0, 1.0 * n) / n - at.v);
   const double room = std::min(cell.speed_u * across_u, cell.speed_v * across_v);
-  return {cell.rate, std::max(room, 0.0)};
+  return {cell.rate, std::max(room, 0.0), cell.least};
 }
 
 bool is_flat(const CellBounds& b, double size) {

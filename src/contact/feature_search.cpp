@@ -227,7 +227,7 @@ FeatureContact find_point_contact(const Particle& particle, const Vec3& a, const
     JetLanes jet;
     evaluate2(shape.patches[g.where.patch], g.where.u, g.where.v, &jet);
     SupportModel model;
-    if (!make_support_model(axes, Vec3::Zero(), jet, LocalRate{0, 0}, &model)) break;
+    if (!make_support_model(axes, Vec3::Zero(), jet, LocalRate{0, 0, 0}, &model)) break;
     const Vec3 t = vec(model.tangent), n = vec(model.normal), s = n.cross(t);
     if (!((n + d).norm() < 1e-4)) break;  // a kink: the normal is not what was asked for
     // (W - overlap) tau = (x - a) across d.

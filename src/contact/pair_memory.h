@@ -112,7 +112,7 @@ NURBS_INLINE Mask<Real> serves(const LocalContactOf<Real>& c, const Real& unique
 // The rate at a point of a body, lengths of the lab.
 inline LocalRate local_rate(const Shape& shape, double scale, const SurfacePoint& at) {
   const LocalRate r = rate_near(shape.rates[at.patch], at);
-  return {scale * r.rate, scale * r.room};
+  return {scale * r.rate, scale * r.room, scale * r.least};
 }
 
 // Whether a model made now is worth its 50 ns: bodies that turn as they did since the last solve, at the
