@@ -14,7 +14,7 @@ namespace nurbs {
 namespace {
 
 constexpr int kHalvings = 6;
-constexpr double kKinkStray = 1e-3;
+constexpr double kKinkStray = 4e-3;
 
 struct Chord {
   Vec3 from, to;
@@ -28,27 +28,31 @@ double from_chord(const Vec3& x, const Chord& c) {
   return (y - t * along).norm();
 }
 
-void add(const Bernstein<Vec4>& piece, double enough, int depth, std::vector<Chord>* chords) {
+void add(const Bernstein<Vec4>& piece, double enough, double gap, int depth, std::vector<Chord>* chords) {
   const auto place = [](const Vec4& p) { return Vec3(p.head<3>() / p[3]); };
   Chord chord{place(piece.front()), place(piece.back()), 0};
   for (const Vec4& p : piece) chord.stray = std::max(chord.stray, from_chord(place(p), chord));
   if (chord.stray <= enough || depth == 0) {
+    chord.stray += gap;
     chords->push_back(chord);
     return;
   }
   const auto [low, high] = halve(piece);
-  add(low, enough, depth - 1, chords);
-  add(high, enough, depth - 1, chords);
+  add(low, enough, gap, depth - 1, chords);
+  add(high, enough, gap, depth - 1, chords);
 }
 
-// Poles that are tips are kinked joints too.
+// Each joint from the side that comes first, whose gap is counted; poles that are tips are kinked joints too.
 std::vector<Chord> all_chords(const Shape& shape) {
   std::vector<Chord> chords;
   for (size_t p = 0; p < shape.patches.size(); ++p)
     for (int edge = 0; edge < 4; ++edge) {
       const EdgeLink& link = shape.links[p][edge];
-      if (std::max(std::abs(link.kink), link.kink_bound) > kNoKink)
-        add(edge_net(shape.patches[p], edge), kKinkStray * shape.bounding_radius, kHalvings, &chords);
+      const bool seen = link.patch >= 0 && (link.patch < static_cast<int>(p) ||
+                                            (link.patch == static_cast<int>(p) && link.edge < edge));
+      if (!seen && std::max(std::abs(link.kink), link.kink_bound) > kNoKink)
+        add(edge_net(shape.patches[p], edge), kKinkStray * shape.bounding_radius, link.gap, kHalvings,
+            &chords);
     }
   return chords;
 }

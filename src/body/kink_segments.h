@@ -40,7 +40,7 @@ void archive(Archive& a, KinkSegments& s) {
 }
 
 // Of a shape whose patches, links and balls are done: of all joints with a kink above kNoKink, halved until
-// they stray by kKinkStray of the bounding radius from their chords, by their control points.
+// they stray by a 250th of the bounding radius from their chords, by their control points.
 KinkSegments find_kink_segments(const Shape& shape);
 
 }  // namespace nurbs

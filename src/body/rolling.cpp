@@ -30,7 +30,7 @@ double inscribed(const Shape& shape, double cover) {
 
 constexpr double kSineOfOne = 0.84;
 constexpr double kNarrow = 0.1;  // of the bounding radius: patches whose width says little
-constexpr double kSharp = 0.05;  // ... and balls that local bounds may replace by larger ones
+constexpr double kSharp = 0.02;  // ... and balls that serve; smaller ones are looked into
 
 // Ball that touches at a point, by what is known of the surface around it on its patch.
 double local_ball(const Shape& shape, const SurfacePoint& at) {
@@ -80,19 +80,23 @@ RollingRadii rolling_radii(const Shape& shape, const SurfacePoint& at, const Vec
   const double parameter[4] = {at.u, 1 - at.u, at.v, 1 - at.v};
   for (int edge = 0; edge < 4; ++edge)
     if (speed[edge] < kInfinity) s = std::min(s, speed[edge] * std::max(0.0, parameter[edge]));
-  if (!joints.segments.empty()) {
-    const BezierPatch& on = shape.patches[at.patch];
-    s = std::max(s, joints.segments.distance(at.patch, evaluate0(on, at.u, at.v)));
-  }
-  const double r0 = patch.min_radius;
-  RollingRadii radii{std::min(r0, inscribed(shape, kSineOfOne * std::min(s, r0))), patch.max_radius,
-                     shape.support_excess, near};
+  const double r0 = patch.min_radius, enough = kSharp * shape.bounding_radius;
+  const auto ball_clear_of = [&](double distance) {
+    return std::min(r0, inscribed(shape, kSineOfOne * std::min(distance, r0)));
+  };
+  double inner = ball_clear_of(s);
   if (joints.convex <= kSmallKink) {
     double across_kinks = std::min(0.5 * r0, inscribed(shape, kSineOfOne * std::min(joints.width, r0)));
     if (joints.convex > 0) across_kinks = std::min(across_kinks, 0.25 * s / joints.convex);
-    radii.inner = std::max(radii.inner, across_kinks);
+    inner = std::max(inner, across_kinks);
   }
-  if (radii.inner < kSharp * shape.bounding_radius) radii.inner = std::max(radii.inner, local_ball(shape, at));
+  if (inner < enough) inner = std::max(inner, local_ball(shape, at));
+  if (inner < enough && !joints.segments.empty()) {
+    const BezierPatch& on = shape.patches[at.patch];
+    s = std::max(s, joints.segments.distance(at.patch, evaluate0(on, at.u, at.v)));
+    inner = std::max(inner, ball_clear_of(s));
+  }
+  RollingRadii radii{inner, patch.max_radius, shape.support_excess, near};
   if (joints.concave > 0) {
     const bool clear = s >= patch.max_radius * joints.concave;
     radii.outer = clear ? 2 * patch.max_radius : kInfinity;

@@ -10,6 +10,7 @@
 namespace nurbs {
 namespace {
 
+constexpr int kEdgeIterations = 8;       // 1 or 2 are usual
 constexpr double kLeastCrossing = 1e-4;  // sine of the angle between edges
 constexpr double kGoesOn = 0.99;         // cosine of the angle between an edge and the one that it goes on as
 constexpr double kAcross = 0.1;          // cosine between an edge and a normal that it may be square to
@@ -179,7 +180,7 @@ struct Solved {
 
 // Both edges: where they are square to the line between them.
 bool solve_edges(const PairFrame& pair, Side& a, Side& b, const Vec3& direction, double tilt, Solved* out) {
-  for (out->steps = 1; out->steps <= kWarmIterations; ++out->steps) {
+  for (out->steps = 1; out->steps <= kEdgeIterations; ++out->steps) {
     a.evaluate(pair, true);
     b.evaluate(pair, false);
     const Vec3 g = a.x - b.x;
@@ -203,7 +204,7 @@ bool solve_edges(const PairFrame& pair, Side& a, Side& b, const Vec3& direction,
 // An edge or a vertex, and a surface: the edge is square to the surface's normal, on which its point lies.
 bool solve_surface(const PairFrame& pair, Side& sharp, Side& round, bool sharp_is_a, double tilt,
                    Solved* out) {
-  for (out->steps = 1; out->steps <= kWarmIterations; ++out->steps) {
+  for (out->steps = 1; out->steps <= kEdgeIterations; ++out->steps) {
     sharp.evaluate(pair, sharp_is_a);
     round.evaluate(pair, !sharp_is_a);
     const Vec3 su = round.jet.at(JetLanes::kSu), sv = round.jet.at(JetLanes::kSv), cross = su.cross(sv);

@@ -2,6 +2,7 @@
 // not found here is solved one at a time.
 #include <limits>
 
+#include "contact/edge_search.h"
 #include "contact/joint_lanes.h"
 #include "scene/block_lanes.h"
 #include "scene/contact_results.h"
@@ -37,6 +38,7 @@ void ContactStages::follow_surfaces(ContactBlock& block, int first, Results& res
     block.get(lane, kPoints, 10, points[l]);
     pairs.on_a[l] = warm_point(points[l][0], *pa.shape);
     pairs.on_b[l] = warm_point(points[l][1], *pb.shape);
+    if (is_on_edge(*pa.shape, pairs.on_a[l]) || is_on_edge(*pb.shape, pairs.on_b[l])) continue;
     pairs.a[l] = pa.shape;
     pairs.b[l] = pb.shape;
     pairs.scale_a[l] = pa.scale;
