@@ -11,7 +11,7 @@ namespace {
 
 constexpr double kLocated = 1e-7;
 constexpr double kNearEdge = 1e-4;  // of a patch's parameters
-constexpr int kIterations = 8;
+constexpr int kIterations = 8, kMostPatches = 12;
 
 double miss(const Shape& shape, const SurfacePoint& at, const Vec3& x) {
   return (evaluate0(shape.patches[at.patch], at.u, at.v) - x).norm();
@@ -46,12 +46,8 @@ bool on_sharp_edge(const Shape& shape, const SurfacePoint& at, double near, cons
   return false;
 }
 
-}  // namespace
-
-SurfacePoint locate_point(const Shape& shape, const SurfacePoint& start, const Vec3& x) {
-  const double allowed = kLocated * shape.bounding_radius;
-  SurfacePoint at = start, found;
-  if (on_sharp_edge(shape, at, kOnEdge, x, allowed, &found)) return found;
+// By Newton from `at`; false where it ends elsewhere.
+bool go_to(const Shape& shape, SurfacePoint at, const Vec3& x, double allowed, SurfacePoint* found) {
   for (int k = 0; k < kIterations; ++k) {
     const Jet1 j = evaluate1(shape.patches[at.patch], at.u, at.v);
     const Vec3 r = x - j.s;
@@ -64,8 +60,25 @@ SurfacePoint locate_point(const Shape& shape, const SurfacePoint& start, const V
     const SurfacePoint next{at.patch, at.u + du, at.v + dv};
     at = next.on_patch() ? next : walk(shape, at, du, dv);
   }
-  if (!(miss(shape, at, x) <= allowed)) return start;
-  return on_sharp_edge(shape, at, kNearEdge, x, allowed, &found) ? found : at;
+  if (!(miss(shape, at, x) <= allowed)) return false;
+  if (!on_sharp_edge(shape, at, kNearEdge, x, allowed, found)) *found = at;
+  return true;
+}
+
+}  // namespace
+
+SurfacePoint locate_point(const Shape& shape, const SurfacePoint& start, const Vec3& x) {
+  const double allowed = kLocated * shape.bounding_radius;
+  SurfacePoint found;
+  if (on_sharp_edge(shape, start, kOnEdge, x, allowed, &found) || go_to(shape, start, x, allowed, &found))
+    return found;
+  int tried = 0;
+  for (int p = 0; p < static_cast<int>(shape.patches.size()) && tried < kMostPatches; ++p) {
+    if (!((x - shape.balls[p].center).norm() <= shape.balls[p].radius + allowed)) continue;
+    ++tried;
+    if (go_to(shape, {p, 0.5, 0.5}, x, allowed, &found)) return found;
+  }
+  return start;
 }
 
 }  // namespace nurbs

@@ -32,10 +32,16 @@ constexpr double kSineOfOne = 0.84;
 constexpr double kNarrow = 0.1;  // of the bounding radius: patches whose width says little
 constexpr double kSharp = 0.02;  // ... and balls that serve; smaller ones are looked into
 
-// Ball that touches at a point, by what is known of the surface around it on its patch.
+// Ball that touches at a point, by what is known of the surface around it on its patch, and of bodies of
+// revolution all round.
 double local_ball(const Shape& shape, const SurfacePoint& at) {
   if (shape.rates.empty()) return 0;  // while the body is made
-  const LocalRate here = rate_near(shape.rates[at.patch], at);
+  const Meridian& m = shape.meridian;
+  const int sector = m.empty() ? -1 : m.sector_of[at.patch];
+  const Alike alike = sector < 0                      ? Alike::none
+                      : m.sectors[sector].arcs_in_u ? Alike::along_u
+                                                    : Alike::along_v;
+  const LocalRate here = rate_near(shape.rates[at.patch], at, alike);
   const double least = std::min(here.least, shape.bounding_radius);
   return std::min(least, inscribed(shape, kSineOfOne * std::min(here.room, least)));
 }

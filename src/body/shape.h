@@ -104,7 +104,9 @@ void archive(Archive& a, PatchRate& s) {
 struct LocalRate {
   double rate, room, least;
 };
-LocalRate rate_near(const PatchRate& patch, const SurfacePoint& at);
+// `alike`: the parameter along which the body is the same all round, beyond the patch too.
+enum class Alike { none, along_u, along_v };
+LocalRate rate_near(const PatchRate& patch, const SurfacePoint& at, Alike alike = Alike::none);
 
 // What is proven of a body, and how tightly: for reports (nurbs-shape check).
 struct Proofs {

@@ -20,6 +20,9 @@ constexpr double kInfinity = std::numeric_limits<double>::infinity();
 // Cells spent on the least radius, over kMostCells: loose, it costs every turning contact of the body a cold
 // solve.
 constexpr int kLeastRadiusBudget = 4;
+constexpr double kSharpBend = 0.02;      // of the bounding radius: a body's least radius
+constexpr double kLocalTightness = 0.4;  // of a cell's least radius and the one in its middle
+constexpr int kLocalCellsPerPatch = 100;
 // The same for the proof of convexity, where no hollow is seen: without it every support is doubted.
 constexpr int kConvexBudget = 6;
 // Halvings of a patch on a ball: parameters that still fold are a sliver's.
@@ -489,6 +492,9 @@ class Bounder {
     halve_while([this](const Leaf& leaf) { return radii_loose(leaf); },
                 std::max(most, out_.cells + most / 2));
     if (!wanted_.rate) return leave();
+    if (bends_sharply())
+      halve_while([this](const Leaf& leaf) { return loose_here(leaf); },
+                  out_.cells + kLocalCellsPerPatch * patches_);
     begin_rates();
     const int enough = out_.cells + kMostRateCells + kMostCellsPerPatch * patches_;
     halve_while([this](const Leaf& leaf) { return unrated(leaf) && rate_loose(leaf); }, enough);
@@ -584,6 +590,18 @@ class Bounder {
     return b.min_radius < out_.seen_min / kRadiusTightness || b.max_radius > kRadiusTightness * out_.seen_max;
   }
 
+  // Somewhere, so that elsewhere its least radius says nothing: tips, needles' ends, hardly rounded edges.
+  bool bends_sharply() const {
+    return std::any_of(out_.leaves.begin(), out_.leaves.end(), [this](const Leaf& leaf) {
+      return leaf.bounds.min_radius < kSharpBend * shape_.bounding_radius;
+    });
+  }
+  // As far as the grids of radii (PatchRate) can tell.
+  bool loose_here(const Leaf& leaf) const {
+    return std::max(leaf.cell.du, leaf.cell.dv) > 0.5 / kRateCells &&
+           leaf.bounds.min_radius < kLocalTightness * leaf.bounds.seen_min;
+  }
+
   bool unrated(const Leaf& leaf) const { return !(leaf.bounds.rate < kInfinity) && wants_rate(leaf.cell); }
 
   bool rate_loose(const Leaf& leaf) const {
@@ -654,15 +672,18 @@ class Bounder {
 
 }  // namespace
 
-LocalRate rate_near(const PatchRate& patch, const SurfacePoint& at) {
+LocalRate rate_near(const PatchRate& patch, const SurfacePoint& at, Alike alike) {
   constexpr int n = kRateCells;
   const int i = std::clamp(static_cast<int>(at.u * n), 0, n - 1),
             j = std::clamp(static_cast<int>(at.v * n), 0, n - 1);
   const PatchRate::Cell& cell = patch.cells[i * n + j];
   // To the rim of the three by three cells around, within the patch.
-  const double across_u = std::min(at.u - std::max(i - 1.0, 0.0) / n, std::min(i + 2.0, 1.0 * n) / n - at.u),
-               across_v = std::min(at.v - std::max(j - 1.0, 0.0) / n, std::min(j + 2.0, 1.0 * n) / n - at.v);
-  const double room = std::min(cell.speed_u * across_u, cell.speed_v * across_v);
+  const auto across = [](double x, int k) {
+    return std::min(x - std::max(k - 1.0, 0.0) / n, std::min(k + 2.0, 1.0 * n) / n - x);
+  };
+  double room = std::numeric_limits<double>::infinity();
+  if (alike != Alike::along_u) room = std::min(room, cell.speed_u * across(at.u, i));
+  if (alike != Alike::along_v) room = std::min(room, cell.speed_v * across(at.v, j));
   return {cell.rate, std::max(room, 0.0), cell.least};
 }
 
