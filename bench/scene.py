@@ -9,7 +9,7 @@
 A picture is drawn beside the CSV (default: scene.csv or scene_tolerance.csv in BUILD/scene).
 
 Cases: sphere (the host's own), nurbs-sphere, ellipsoid (1 : 1.5 : 2), pebble, blocky (exponent 4), tablet (flat
-faces, rounded rims), and, where the environment says LIGGGHTS_SUPERQUADRIC=program, superquadric-ellipsoid and
+faces, rounded rims), cylinder (sharp rims), and, where the environment says LIGGGHTS_SUPERQUADRIC=program, superquadric-ellipsoid and
 superquadric-blocky. All particles have the volume of a sphere of 5 mm and the same linear law; the decks are
 bench/decks/in.*. A bed is a lattice, turned at random, dropped into a box of six planes and settled (above 10,000
 particles: 4 x 4 such beds side by side in one box); then the lid comes down to 1.4 times its height. Every shape's bed
@@ -55,6 +55,7 @@ ROOT = pathlib.Path(__file__).resolve().parents[1]
 DECKS = ROOT / "bench" / "decks"
 sys.path.insert(0, str(ROOT / "tests" / "decks"))
 import deck  # noqa: E402
+import shapes  # noqa: E402
 
 RADIUS, DENSITY, GRAVITY, DT = 0.005, 2500.0, 9.81, 5e-5  # dt and the law stand in the decks too
 VOLUME = 4 / 3 * math.pi * RADIUS**3
@@ -62,12 +63,13 @@ SETTLE, RELAX, TURN, WARM = 15000, 2000, 4000, 100  # steps: of the drop; to res
 MOST_SETTLED, TILES = 10000, 4  # larger beds are 4 x 4 smaller ones
 TURNS = {"rest": 0, "tumbling": 1}  # of gravity, a second
 
-SHAPES = {  # arguments of nurbs-shape make
+SHAPES = {  # arguments of nurbs-shape make, or a profile to turn about z
     "sphere": ["sphere"],
     "ellipsoid": ["ellipsoid", "--axes", "1,1.5,2"],
     "pebble": ["pebble"],
     "blocky": ["superellipsoid", "--axes", "1,1,1", "--exponent", "4"],
     "tablet": ["tablet", "--radius", "1", "--height", "0.8", "--rim", "0.15"],
+    "cylinder": [(0, -0.6), (1, -0.6), (1, 0.6), (0, 0.6)],
 }
 CASES = {  # name: (deck, shape of the bed)
     "sphere": ("sphere", "sphere"),
@@ -76,6 +78,7 @@ CASES = {  # name: (deck, shape of the bed)
     "pebble": ("nurbs", "pebble"),
     "blocky": ("nurbs", "blocky"),
     "tablet": ("nurbs", "tablet"),
+    "cylinder": ("nurbs", "cylinder"),
     "superquadric-ellipsoid": ("superquadric", "ellipsoid"),
     "superquadric-blocky": ("superquadric", "blocky"),
 }
@@ -181,7 +184,9 @@ class Shape:
     def __init__(self, name, directory):
         self.name, self.file = name, directory / f"{name}.json"
         tool = str(deck.BUILD / "nurbs-shape")
-        if not self.file.exists():
+        if not self.file.exists() and isinstance(SHAPES[name][0], tuple):
+            self.file.write_text(shapes.revolved(SHAPES[name]))
+        elif not self.file.exists():
             subprocess.run([tool, "make", *SHAPES[name], "-o", str(self.file)], check=True, stdout=subprocess.DEVNULL,
                            stderr=subprocess.DEVNULL)
         words = subprocess.run([tool, "info", str(self.file)], check=True, capture_output=True, text=True).stdout

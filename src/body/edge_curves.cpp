@@ -49,8 +49,8 @@ double bend_of(double weight, double binormal, double speed) {
 void bound(const Piece& piece, double noise, int depth, double* bend, double* speed) {
   const double w = *std::max_element(piece.weight.begin(), piece.weight.end());
   const double low = least(piece.hodograph);
-  const double upper = low > 0 ? bend_of(w, largest(piece.binormal) + noise, low)
-                               : std::numeric_limits<double>::infinity();
+  const double upper =
+      low > 0 ? bend_of(w, largest(piece.binormal) + noise, low) : std::numeric_limits<double>::infinity();
   const auto at_end = [&](bool last) {
     const auto end = [last](const auto& f) { return last ? f.back() : f.front(); };
     return bend_of(end(piece.weight), end(piece.binormal).norm() + noise, end(piece.hodograph).norm());

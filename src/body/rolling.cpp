@@ -38,7 +38,7 @@ double local_ball(const Shape& shape, const SurfacePoint& at) {
   if (shape.rates.empty()) return 0;  // while the body is made
   const Meridian& m = shape.meridian;
   const int sector = m.empty() ? -1 : m.sector_of[at.patch];
-  const Alike alike = sector < 0                      ? Alike::none
+  const Alike alike = sector < 0                    ? Alike::none
                       : m.sectors[sector].arcs_in_u ? Alike::along_u
                                                     : Alike::along_v;
   const LocalRate here = rate_near(shape.rates[at.patch], at, alike);

@@ -17,9 +17,9 @@ struct Shape;
 // crossed per unit of parameter (proven), infinite where the joint is smooth.
 struct JointDistance {
   std::vector<std::array<double, 4>> speed;
-  double width = 0;    // least width of a patch: no kinked joint beyond a smooth one is nearer than this
-  double convex = 0;   // largest kink that opens, rad
-  double concave = 0;  // largest kink that closes, rad
+  double width = 0;       // least width of a patch: no kinked joint beyond a smooth one is nearer than this
+  double convex = 0;      // largest kink that opens, rad
+  double concave = 0;     // largest kink that closes, rad
   KinkSegments segments;  // where the width is next to nothing; else empty
   bool none() const { return convex == 0 && concave == 0; }
 };

@@ -24,8 +24,8 @@ NURBS_INLINE Mask<Real> dents_count(const Real& excess, const Real& tolerance) {
   return excess > 0.1 * tolerance;
 }
 
-// h_A(d) + h_B(-d) at most, of the hulls, right to kSupportShare of `tolerance`; lengths of the lab. 0.1 us for
-// each body, 0.4 us where a dent is near.
+// h_A(d) + h_B(-d) at most, of the hulls, right to kSupportShare of `tolerance`; lengths of the lab. 0.1 us
+// for each body, 0.4 us where a dent is near.
 inline double confirmed_heights(const NormalSide& a, const NormalSide& b, double tolerance) {
   const auto height = [tolerance](const NormalSide& side) {
     return side.scale *

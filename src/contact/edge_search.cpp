@@ -349,7 +349,8 @@ bool meet_edges(const PairFrame& pair, const Vec3& direction, double tolerance, 
     return meet(pair, a, b, direction, tolerance, tilt, s);
   // The support of a straight edge along a normal of it is an end of it.
   Side on_a[kMostEdges], on_b[kMostEdges];
-  const int count_a = edges_at(a, direction, on_a), count_b = edges_at(b, pair.direction_on_b(direction), on_b);
+  const int count_a = edges_at(a, direction, on_a),
+            count_b = edges_at(b, pair.direction_on_b(direction), on_b);
   for (int i = 0; i < count_a; ++i)
     for (int k = 0; k < count_b; ++k)
       if (meet(pair, on_a[i], on_b[k], direction, tolerance, tilt, s)) return true;

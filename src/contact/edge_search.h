@@ -21,10 +21,11 @@ namespace nurbs {
 //     and linear from k L on). At an angle t from n, with lambda half the least eigenvalue of R_A t_A t_A' +
 //     R_B t_B t_B' square to n, and |r| sin t <= e lambda sin^2 t + |r|^2 / (4 e lambda),
 //         p(d) >= delta cos t + (1 - e) lambda sin^2 t - |r|^2 / (4 e lambda),
-//     which but for the last term is at least delta as long as (1 - e) lambda (1 + cos t) >= delta, until past
-//     a right angle. From there on p(d) >= I_A + I_B - d . offset, I the radii of balls about the centres
-//     inside, which rises with t if offset . n >= 0, so that it is at least delta if it is so there.
-// Then the gap is at most -delta, but for that term. Hypotheses: both bodies hold their edges and those balls.
+//     which but for the last term is at least delta as long as (1 - e) lambda (1 + cos t) >= delta, until
+//     past a right angle. From there on p(d) >= I_A + I_B - d . offset, I the radii of balls about the
+//     centres inside, which rises with t if offset . n >= 0, so that it is at least delta if it is so there.
+// Then the gap is at most -delta, but for that term. Hypotheses: both bodies hold their edges and those
+// balls.
 bool meet_edges(const PairFrame& pair, const Vec3& direction, double tolerance, double tilt,
                 JointSolution* s);
 

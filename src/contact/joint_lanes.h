@@ -34,7 +34,9 @@ struct JointLanes {
   SurfacePoint base_a[kWidth], base_b[kWidth];  // ... and where that was
 
   // A lane's bodies along its normal.
-  NormalSide side_a(int l) const { return {*a[l], scale_a[l], on_shape(turn_a, lane(normal, l), l), on_a[l]}; }
+  NormalSide side_a(int l) const {
+    return {*a[l], scale_a[l], on_shape(turn_a, lane(normal, l), l), on_a[l]};
+  }
   NormalSide side_b(int l) const {
     return {*b[l], scale_b[l], on_shape(turn_b, -lane(normal, l), l), on_b[l]};
   }

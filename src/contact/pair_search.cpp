@@ -155,7 +155,8 @@ class Ladder {
     const double excess = pair.scale_a * pair.a->support_excess + pair.scale_b * pair.b->support_excess;
     if (!s.stationary || !dents_count(excess, tolerance) || s.bracket.width() > 2 * excess + tolerance)
       return false;
-    const double p = confirmed_heights(side_a(pair, s), side_b(pair, s), tolerance) - s.normal.dot(pair.offset);
+    const double p =
+        confirmed_heights(side_a(pair, s), side_b(pair, s), tolerance) - s.normal.dot(pair.offset);
     if (-p > s.bracket.lower) {
       s.bracket.lower = -p;
       s.bracket.direction = s.normal;
@@ -338,7 +339,8 @@ class Ladder {
                                                       : r;
   }
 
-  // The hull's points are where the bodies meet, but its places only have the same supports: for the next step.
+  // The hull's points are where the bodies meet, but its places only have the same supports: for the next
+  // step.
   static void locate(const PairFrame& pair, PointPair* p) {
     p->on_a = locate_point(*pair.a, p->on_a, p->a / pair.scale_a);
     p->on_b = locate_point(*pair.b, p->on_b, pair.turn.transpose() * (p->b - pair.offset) / pair.scale_b);

@@ -12,8 +12,9 @@ constexpr int kPairMemorySize = 54;
 // Gap, normal and contact points of two particles. The rungs, each a function of pair_search.cpp: the budget
 // of the last proof and the bounding spheres (7 ns); spheres and ellipsoids in closed form (20 and 170 ns;
 // sphere_search.h, ellipsoid_search.h); the direction atlases (80 ns); the local model (65 ns);
-// Newton from the last contact (0.25 us, 2 us next to a dent, 10 us over it), where that is on a face or two
-// creases along their known direction (1 us; flat_search.h); a cold start (2 us); the
+// Newton from the last contact (0.25 us, 0.7 us next to a dent, 1.5 us over it, 1 us on sharp edges and
+// vertices; joint_newton.h, bridge_search.h, edge_search.h), where that is on a face or two straight creases
+// along their known direction (0.5 us; flat_search.h); a cold start (2 us); the
 // search over directions of deep pairs (10 us); the polytope (70 us and more). A pair that touched last time
 // begins at the local model. Neither throws nor allocates, but for a shape's inner map, which is made where a
 // bracket stays open without it (one deep pair in 5,000); always returns a bracket. Deep pairs of shapes

@@ -1,7 +1,6 @@
 #!/usr/bin/python3
 """A bed of bodies with sharp edges, as CAD has them: cylinders and cones with flat ends. Its contacts go on from step to
 step without searches over directions, the energy sum closes, and a restart in it changes no bit on other numbers of ranks."""
-import json
 import pathlib
 import sys
 import unittest
@@ -10,6 +9,7 @@ import numpy as np
 
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent))
 import deck  # noqa: E402
+from shapes import revolved  # noqa: E402
 
 BEGIN = """
 units si
@@ -47,19 +47,6 @@ thermo_style custom step atoms ke c_stats[7] c_stats[8] c_low
 thermo 100
 """
 END = "write_dump all custom end.txt id x y z vx vy vz modify sort id format '%d %.17g %.17g %.17g %.17g %.17g %.17g'\n"
-
-
-def revolved(profile):
-    """A shape file: the polygon of (radius, height) about z, from pole to pole."""
-    root = 0.5**0.5
-    circle = [(1, 0, 1), (1, 1, root), (0, 1, 1), (-1, 1, root), (-1, 0, 1), (-1, -1, root), (0, -1, 1), (1, -1, root), (1, 0, 1)]
-    last = len(profile) - 1
-    surface = {"degree_u": 2, "degree_v": 1, "size_u": 9, "size_v": last + 1,
-               "knotvector_u": [0, 0, 0, .25, .25, .5, .5, .75, .75, 1, 1, 1],
-               "knotvector_v": [0] + [k / last for k in range(last + 1)] + [1],
-               "control_points": {"points": [[r * x, r * y, z] for x, y, _ in circle for r, z in profile],
-                                  "weights": [w for _, _, w in circle for _ in profile]}}
-    return json.dumps({"shape": {"type": "surface", "count": 1, "data": [surface]}})
 
 
 FILES = {"cylinder.json": revolved([(0, -0.6), (1, -0.6), (1, 0.6), (0, 0.6)]), "cone.json": revolved([(0, 0), (1, 0), (0, 1.4)])}
