@@ -255,9 +255,8 @@ unsigned follow_joints(unsigned asked, double enough, JointLanes* pairs) {
     const Wide tolerance = pairs->tolerance, width = bracket.upper - bracket.lower;
     const WideMask usual = mask_of(open) & step.regular & a.plain & b.plain & bracket.apart &
                            (bracket.lower <= enough) & next.inside();
-    const WideMask close =
-        (width <= tolerance) &
-        (bracket.angle2 * pairs->size <= larger<Wide>(kSquaredAngle * tolerance, kRoundoff * pairs->size));
+    const WideMask close = (width <= tolerance) &
+                           (bracket.angle2 * pairs->size <= larger<Wide>(tolerance, kRoundoff * pairs->size));
 
     // The step spent on a second-order update of points and normal.
     const V of_a = turned_normal(a.normal, a.at, bend_a, step.metric_a, step.au, step.av),
@@ -276,7 +275,7 @@ unsigned follow_joints(unsigned asked, double enough, JointLanes* pairs) {
     for (int l = 0; l < kWidth; ++l) dented |= static_cast<unsigned>(pairs->dented[l]) << l;
     // Closed but for what a dent may hide.
     const WideMask settled = mask_of(dented) & dents_count<Wide>(a.slack + b.slack, tolerance) & ~close &
-                             (bracket.angle2 * pairs->size <= kSquaredAngle * tolerance) &
+                             (bracket.angle2 * pairs->size <= tolerance) &
                              (bracket.upper - gap <= 0.5 * tolerance);
     const WideMask done = refined & (close | settled);
     const auto keep = [&done](const auto& now, auto* kept) { *kept = select(done, now, *kept); };

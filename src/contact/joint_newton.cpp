@@ -178,8 +178,7 @@ NURBS_INLINE bool refine(const PairFrame& pair, JointSolution& s, const Forms& a
 // Gap within the tolerance, and the points after one more Newton step too: near-spheres have the first long
 // before the second.
 bool close_enough(const Bracket& bracket, double tolerance, double size) {
-  return bracket.width() <= tolerance &&
-         bracket.angle2 * size <= std::max(kSquaredAngle * tolerance, kRoundoff * size);
+  return bracket.width() <= tolerance && bracket.angle2 * size <= std::max(tolerance, kRoundoff * size);
 }
 
 // Next to a dent, whose allowance keeps the bracket open: the points after the step would close it but for
@@ -187,8 +186,7 @@ bool close_enough(const Bracket& bracket, double tolerance, double size) {
 NURBS_INLINE bool settles(const PairFrame& pair, JointSolution& s, const Forms& a, const Forms& b,
                           const Steps& steps, double tolerance) {
   const double excess = pair.scale_a * pair.a->support_excess + pair.scale_b * pair.b->support_excess;
-  if (!s.dented || !dents_count(excess, tolerance) ||
-      !(s.bracket.angle2 * pair.size <= kSquaredAngle * tolerance))
+  if (!s.dented || !dents_count(excess, tolerance) || !(s.bracket.angle2 * pair.size <= tolerance))
     return false;
   const PointPair before = s.points;
   if (refine(pair, s, a, b, steps)) {

@@ -27,8 +27,8 @@ struct JointSolution {
 // Solves g.A_u = g.A_v = 0, B_u.n_A = B_v.n_A = 0 with g = A - B and A's unit normal n_A, starting from
 // `on_a`, `on_b`; regular at g = 0. Stops as soon as the certificate's bracket is within `tolerance` (a
 // length), then spends the step already solved for on a second-order update of the points: their normals were
-// within sqrt(tolerance / (10 size)) of the answer's, the updated one is within about tolerance / size. Where
-// the update can't be trusted, one iteration more. Two second-derivative evaluations an iteration; gives up
+// within sqrt(tolerance / size) of the answer's, the updated one is within about tolerance / size. Where the
+// update can't be trusted, one iteration more. Two second-derivative evaluations an iteration; gives up
 // (converged = false) after `cap` iterations or where the relative curvature is singular.
 JointSolution solve_joint(const PairFrame& pair, const SurfacePoint& on_a, const SurfacePoint& on_b,
                           double tolerance, double enough, int cap);

@@ -31,7 +31,7 @@ constexpr int kPairMemorySize = 54;
 // wide; that is proven. The force is better, by estimates that are no proofs: the normal is right to about t
 // rad, the overlap to about t times itself, or t times kForceDepth of the radius where it is shallower, hence
 // a force kn overlap or kn overlap^1.5 along the normal to about t of its size. Newton's last update squares
-// an angle of at most sqrt(t / 10); the local model serves while what it left out says so. Not held to it:
+// an angle of at most sqrt(t); the local model serves while what it left out says so. Not held to it:
 // contacts that only the polytope resolves, on kinks and in deep overlap, and those next to a pole,
 // where normals are right to about sqrt(t).
 //

@@ -187,9 +187,6 @@ constexpr double kNoDirection =
 constexpr double kSingular = 1e-13;  // 2 x 2 determinant over the sum of its products' sizes
 constexpr double kStationary =
     1e-10;  // angle between the normals, and offset across them over the smaller radius
-constexpr double kSquaredAngle =
-    0.1;  // of the tolerance over the size: squared angles to the answer's normal that Newton's last step, of
-          // second order, makes less than the tolerance of, where curvature changes fast too
 constexpr double kLargestStep = 0.35;  // of a patch's parameter range in one Newton step
 constexpr double kNearer2 = 1e-3;  // squared offset across the normals over what it was: a step that leaves
                                    // more was none of Newton's, which squares it (next to poles)
