@@ -248,7 +248,8 @@ void compare_tolerances(bool wall, double speed) {
     for (int step = 0; step < 100; ++step) {
       heap.move();
       coarse.compute(heap, settings(tolerance), step == 0);
-      fine.compute(heap, settings(1e-14), step == 0);
+      fine.compute(heap, settings(1e-12),
+                   step == 0);  // nearer to round-off deep pairs change rungs by chance
       for (int i = 0; i < heap.count(); ++i) {
         const auto a = coarse.stages.sum(i), b = fine.stages.sum(i);
         if (!(b.normal > 0)) continue;
