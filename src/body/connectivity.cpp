@@ -61,20 +61,6 @@ double closest_parameter(const BezierPatch& patch, int edge, const Vec3& x) {
   return 0.5 * (lo + hi);
 }
 
-// Closest point of an edge by Gauss-Newton from `t`, a parameter near it: a few steps, since the curves
-// coincide.
-double refine_closest(const BezierPatch& patch, int edge, const Vec3& x, double t) {
-  for (int i = 0; i < 8; ++i) {
-    const Vec2 p = edge_parameters(edge, t);
-    const Jet1 j = evaluate1(patch, p[0], p[1]);
-    const Vec3& along = edge < 2 ? j.sv : j.su;
-    const double before = t;
-    t = std::clamp(t + (x - j.s).dot(along) / along.squaredNorm(), 0.0, 1.0);
-    if (std::abs(t - before) < kParameterRoundoff) break;
-  }
-  return t;
-}
-
 constexpr double kNoGap = 1e-6;        // of the tolerance: sides so near have the same parameters
 constexpr double kNotByChance = 1e-2;  // share of a gap that better parameters leave
 
@@ -133,7 +119,7 @@ bool ends_agree(const Edge& a, const Edge& b, bool reversed, double tolerance) {
 double ratio_between(const std::vector<BezierPatch>& patches, const Edge& a, const Edge& b) {
   const double t = closest_parameter(patches[b.patch], b.edge, a.at[kEdgeSamples / 2]);
   const double s =
-      std::clamp(refine_closest(patches[b.patch], b.edge, a.at[kEdgeSamples / 2], t), 1e-6, 1 - 1e-6);
+      std::clamp(closest_on_edge(patches[b.patch], b.edge, a.at[kEdgeSamples / 2], t), 1e-6, 1 - 1e-6);
   return s / (1 - s);
 }
 
@@ -286,7 +272,7 @@ std::array<JointSample, kKinkSamples> sample_joint(const std::vector<BezierPatch
     const double guess = link.projected ? projected_parameter(patches[link.patch], link, s.a.point)
                                         : partner_parameter(link, t);
     const Vec2 there =
-        edge_parameters(link.edge, refine_closest(patches[link.patch], link.edge, s.a.point, guess));
+        edge_parameters(link.edge, closest_on_edge(patches[link.patch], link.edge, s.a.point, guess));
     s.b = local_form(patches[link.patch], there[0], there[1]);
     const bool end = k == 0 || k == kKinkSamples - 1;
     s.counts = !end || (Vec2(s.a.u, s.a.v) == s.at && Vec2(s.b.u, s.b.v) == there);
@@ -343,8 +329,22 @@ int boundary_sense(int edge) {
 
 }  // namespace
 
+double closest_on_edge(const BezierPatch& patch, int edge, const Vec3& x, double from) {
+  double t = from;
+  for (int i = 0; i < 8; ++i) {
+    const Vec2 p = edge_parameters(edge, t);
+    const Jet1 j = evaluate1(patch, p[0], p[1]);
+    const Vec3& along = edge < 2 ? j.sv : j.su;
+    const double length2 = along.squaredNorm(), before = t;
+    if (!(length2 > 0)) break;
+    t = std::clamp(t + (x - j.s).dot(along) / length2, 0.0, 1.0);
+    if (std::abs(t - before) < kParameterRoundoff) break;
+  }
+  return t;
+}
+
 double projected_parameter(const BezierPatch& partner, const EdgeLink& link, const Vec3& x) {
-  return refine_closest(partner, link.edge, x, closest_parameter(partner, link.edge, x));
+  return closest_on_edge(partner, link.edge, x, closest_parameter(partner, link.edge, x));
 }
 
 std::vector<Vec4> edge_net(const BezierPatch& patch, int edge) {

@@ -21,16 +21,23 @@ inline Vec2 edge_parameters(int edge, double t) {
 // Control points of an edge, homogeneous, in the order of its parameter.
 std::vector<Vec4> edge_net(const BezierPatch& patch, int edge);
 
-// Calls visit(patch, edge) once for every joint that opens to a sharp edge, of the side that comes first.
+// Calls visit(patch, edge) once for every joint, of the side that comes first, and every pole.
 template <class Visit>
-void visit_creases(const PatchLinks& links, const Visit& visit) {
+void visit_joints(const PatchLinks& links, const Visit& visit) {
   for (int p = 0; p < static_cast<int>(links.size()); ++p)
     for (int e = 0; e < 4; ++e) {
       const EdgeLink& link = links[p][e];
-      if (link.patch < 0 || link.collapsed || !(link.kink > kSmoothKink)) continue;
-      if (link.patch < p || (link.patch == p && link.edge < e)) continue;
+      if (link.patch >= 0 && (link.patch < p || (link.patch == p && link.edge < e))) continue;
       visit(p, e);
     }
+}
+// Of those the joints that open to a sharp edge.
+template <class Visit>
+void visit_creases(const PatchLinks& links, const Visit& visit) {
+  visit_joints(links, [&](int p, int e) {
+    const EdgeLink& link = links[p][e];
+    if (link.patch >= 0 && !link.collapsed && link.opens()) visit(p, e);
+  });
 }
 
 // The other end of a link: the parameter `t` of an edge as counted on its partner. Two rational curves that
@@ -43,6 +50,9 @@ inline double partner_parameter(const EdgeLink& link, double t) {
 
 // The same where the parameter has to be looked for: that of the point of the partner's edge closest to x.
 double projected_parameter(const BezierPatch& partner, const EdgeLink& link, const Vec3& x);
+
+// The parameter of an edge's point closest to x, by Gauss-Newton from one near it.
+double closest_on_edge(const BezierPatch& patch, int edge, const Vec3& x, double from);
 
 // The point `at` on edge `edge` of its patch as the patch across that edge, which `link` names, sees it.
 inline SurfacePoint across(const std::vector<BezierPatch>& patches, const EdgeLink& link,

@@ -5,8 +5,8 @@
 #include <cmath>
 
 #include "body/connectivity.h"
+#include "body/edge_polynomials.h"
 #include "body/shape.h"
-#include "nurbs/bernstein.h"
 #include "nurbs/tolerances.h"
 
 namespace nurbs {
@@ -15,20 +15,11 @@ namespace {
 constexpr int kHalvings = 7;
 constexpr double kTight = 1.2;  // a bound is, over a value that occurs
 
-const auto kScale = [](const Vec3& x, double w) { return Vec3(x * w); };
-const auto kCross = [](const Vec3& x, const Vec3& y) { return Vec3(x.cross(y)); };
-
 // Polynomials along a piece of an edge.
 struct Piece {
   Bernstein<Vec3> hodograph, binormal;  // N and N x N'
   Bernstein<double> weight;
 };
-
-double largest(const Bernstein<Vec3>& f) {
-  double most = 0;
-  for (const Vec3& x : f) most = std::max(most, x.norm());
-  return most;
-}
 
 // No |f| is smaller: the least part along the mean.
 double least(const Bernstein<Vec3>& f) {
@@ -68,17 +59,11 @@ void bound(const Piece& piece, double noise, int depth, double* bend, double* sp
 }
 
 EdgeCurve curve_of(const BezierPatch& patch, int edge) {
-  const std::vector<Vec4> net = edge_net(patch, edge);
-  const Vec3 origin = net.front().head<3>() / net.front()[3];
-  Bernstein<Vec3> x;
-  Bernstein<double> w;
-  for (const Vec4& p : net) {
-    x.push_back(p.head<3>() - p[3] * origin);
-    w.push_back(p[3]);
-  }
+  Homogeneous points = edge_net(patch, edge);
+  count_from(Vec4(points.front()), &points);
   Piece piece;
-  piece.weight = w;
-  piece.hodograph = difference(multiply(derivative(x), w, kScale), multiply(x, derivative(w), kScale));
+  piece.weight = weights(points);
+  piece.hodograph = hodograph(points);
   const Bernstein<Vec3> second = derivative(piece.hodograph);
   piece.binormal = multiply(piece.hodograph, second, kCross);
   const double noise = 64 * kRoundoff * largest(piece.hodograph) * largest(second);

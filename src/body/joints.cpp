@@ -6,7 +6,7 @@
 #include <limits>
 
 #include "body/connectivity.h"
-#include "nurbs/bernstein.h"
+#include "body/edge_polynomials.h"
 #include "nurbs/tolerances.h"
 
 namespace nurbs {
@@ -16,11 +16,8 @@ constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 using Scalars = Bernstein<double>;
 using Vectors = Bernstein<Vec3>;
-using Homogeneous = Bernstein<Vec4>;
 
-const auto kScale = [](const Vec3& x, double w) { return Vec3(x * w); };
 const auto kProduct = [](double x, double y) { return x * y; };
-const auto kCross = [](const Vec3& x, const Vec3& y) { return Vec3(x.cross(y)); };
 const auto kDot = [](const Vec3& x, const Vec3& y) { return x.dot(y); };
 
 // Control points of the k-th row from an edge.
@@ -31,17 +28,6 @@ Homogeneous row(const BezierPatch& patch, int edge, int k) {
   const int at = edge % 2 ? depth - k : k;
   for (int i = 0; i <= n; ++i) points.push_back(edge < 2 ? patch.point(at, i) : patch.point(i, at));
   return points;
-}
-
-Vectors positions(const Homogeneous& points) {
-  Vectors x;
-  for (const Vec4& p : points) x.push_back(p.head<3>());
-  return x;
-}
-Scalars weights(const Homogeneous& points) {
-  Scalars w;
-  for (const Vec4& p : points) w.push_back(p[3]);
-  return w;
 }
 
 // A polynomial along the far side of a link as one of the near side's parameter.
@@ -74,19 +60,6 @@ double bound(const Ratio& f, double reached, int depth) {
   const double first = bound({std::move(n0), std::move(d0)}, reached, depth - 1);
   return std::max(
       first, bound({std::move(n1), std::move(d1)}, std::max(reached, first / kJointTightness), depth - 1));
-}
-
-// Farthest that a piece of a curve strays from its chord.
-double stray(const Homogeneous& piece) {
-  const Vec3 a = piece.front().head<3>() / piece.front()[3], b = piece.back().head<3>() / piece.back()[3];
-  const Vec3 along = b - a;
-  double most = 0;
-  for (const Vec4& p : piece) {
-    const Vec3 x = p.head<3>() / p[3] - a;
-    const double t = along.squaredNorm() > 0 ? std::clamp(x.dot(along) / along.squaredNorm(), 0.0, 1.0) : 0;
-    most = std::max(most, (x - t * along).norm());
-  }
-  return most;
 }
 
 // The part [from, to] of a curve.
@@ -134,12 +107,6 @@ double bound_projected_gap(const BezierPatch& a, int edge, const BezierPatch& b,
   return gap;
 }
 
-// Positions as seen from the first one of an edge, so that small patches far from the origin cancel little.
-void count_from(const Vec4& first, Homogeneous* points) {
-  const Vec3 origin = first.head<3>() / first[3];
-  for (Vec4& p : *points) p.head<3>() -= p[3] * origin;
-}
-
 // Normal along an edge, outward, any length: w^3 (x_u cross x_v) of the homogeneous (X, w), by which it is
 // w (X_u cross X_v) - w_v X_u cross X - w_u X cross X_v.
 Vectors normal_along(const BezierPatch& patch, int edge) {
@@ -156,12 +123,6 @@ Vectors normal_along(const BezierPatch& patch, int edge) {
   Vectors sum = multiply(multiply(xu, xv, kCross), weights(here), kScale);
   sum = difference(sum, multiply(multiply(xu, x, kCross), weights(v), kScale));
   return difference(sum, multiply(multiply(x, xv, kCross), weights(u), kScale));
-}
-
-double largest(const Vectors& f) {
-  double most = 0;
-  for (const Vec3& x : f) most = std::max(most, x.norm());
-  return most;
 }
 
 // Divides out the ends at which the normal vanishes: a pole lies there. Compared with the coefficients beside
@@ -256,9 +217,7 @@ KinkBounds bound_kink(const BezierPatch& a, int edge, const BezierPatch& b, cons
   // The tangent, any length, with a's surface on its left: w X' - X w'.
   Homogeneous here = row(a, edge, 0);
   count_from(Vec4(here.front()), &here);
-  const Homogeneous along = derivative(here);
-  m.along = difference(multiply(positions(along), weights(here), kScale),
-                       multiply(positions(here), weights(along), kScale));
+  m.along = hodograph(here);
   if (edge == 0 || edge == 3)
     for (Vec3& t : m.along) t = -t;
   bounds = {0, 0};

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "body/connectivity.h"
 #include "body/support.h"
 
 namespace nurbs {
@@ -17,30 +18,16 @@ double miss(const Shape& shape, const SurfacePoint& at, const Vec3& x) {
   return (evaluate0(shape.patches[at.patch], at.u, at.v) - x).norm();
 }
 
-// Along an edge of the patch.
-SurfacePoint on_edge(const Shape& shape, SurfacePoint at, int edge, const Vec3& x) {
-  (edge < 2 ? at.u : at.v) = edge % 2;
-  double& t = edge < 2 ? at.v : at.u;
-  for (int k = 0; k < kIterations; ++k) {
-    const Jet1 j = evaluate1(shape.patches[at.patch], at.u, at.v);
-    const Vec3& along = edge < 2 ? j.sv : j.su;
-    const double length2 = along.squaredNorm();
-    if (!(length2 > 0)) break;
-    const double last = t;
-    t = std::clamp(t + along.dot(x - j.s) / length2, 0.0, 1.0);
-    if (std::abs(t - last) <= kOnEdge) break;
-  }
-  return at;
-}
-
 // On a sharp edge that is near, if x lies on it.
 bool on_sharp_edge(const Shape& shape, const SurfacePoint& at, double near, const Vec3& x, double allowed,
                    SurfacePoint* found) {
   const double end[4] = {at.u, 1 - at.u, at.v, 1 - at.v};
   for (int edge = 0; edge < 4; ++edge) {
     const EdgeLink& link = shape.links[at.patch][edge];
-    if (end[edge] > near || link.collapsed || !(link.kink > kSmoothKink)) continue;
-    *found = on_edge(shape, at, edge, x);
+    if (end[edge] > near || link.collapsed || !link.opens()) continue;
+    const double from = edge < 2 ? at.v : at.u;
+    const Vec2 to = edge_parameters(edge, closest_on_edge(shape.patches[at.patch], edge, x, from));
+    *found = {at.patch, to[0], to[1]};
     if (miss(shape, *found, x) <= allowed) return true;
   }
   return false;

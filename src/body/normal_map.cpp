@@ -81,8 +81,7 @@ class Painter {
     for (size_t p = 0; p < shape_.patches.size(); ++p)
       for (int e = 0; e < 4; ++e) {
         const EdgeLink& link = shape_.links[p][e];
-        const bool kinked = std::abs(link.kink) > kNoKink || link.kink_bound > kNoKink;
-        if (link.gap > gap || (kinked && may_close(static_cast<int>(p), e)))
+        if (link.gap > gap || (link.kinked() && may_close(static_cast<int>(p), e)))
           paint_joint(static_cast<int>(p), e);
       }
   }

@@ -57,9 +57,8 @@ JointDistance measure_joint_distance(const Shape& shape) {
     for (int edge = 0; edge < 4; ++edge) {
       const EdgeLink& link = shape.links[p][edge];
       const double angle = std::max(std::abs(link.kink), link.kink_bound);
-      const bool kinked = angle > kNoKink;
-      speed[edge] = kinked ? least[edge / 2] : kInfinity;
-      if (kinked)
+      speed[edge] = link.kinked() ? least[edge / 2] : kInfinity;
+      if (link.kinked())
         (link.kink > 0 ? joints.convex : joints.concave) =
             std::max(link.kink > 0 ? joints.convex : joints.concave, angle);
     }

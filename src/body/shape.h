@@ -4,6 +4,7 @@
 #pragma once
 
 #include <array>
+#include <cmath>
 #include <cstdint>
 #include <memory>
 #include <optional>
@@ -45,6 +46,9 @@ struct EdgeLink {
   double kink = 0;  // largest angle between the two normals along the edge, rad; > 0 opens (convex), < 0 is
                     // concave; on a collapsed edge: between the normals around the pole (0 where smooth)
   double kink_bound = 0;  // no angle between two normals there is larger than this, rad: proven
+
+  bool opens() const { return kink > kSmoothKink; }  // to a sharp edge; at a pole: to a tip
+  bool kinked() const { return std::abs(kink) > kNoKink || kink_bound > kNoKink; }
 };
 template <class Archive>
 void archive(Archive& a, EdgeLink& s) {
@@ -188,6 +192,14 @@ struct Shape {
   // Whether a local maximum of d . x may be no global one.
   bool dented() const { return support_excess > kRoundoff * bounding_radius; }
 };
+
+// Whether there is such a point: memory may hold none, or one of another shape, or no numbers.
+inline bool has_patch(const Shape& shape, const SurfacePoint& at) {
+  return at.patch >= 0 && at.patch < static_cast<int>(shape.patches.size());
+}
+inline bool lies_on(const Shape& shape, const SurfacePoint& at) {
+  return has_patch(shape, at) && at.on_patch();
+}
 
 // A shape that can't be used; what() is one line made for the user.
 struct ShapeError : std::runtime_error {

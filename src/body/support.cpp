@@ -254,6 +254,16 @@ Normal set_point(const Shape& shape, const Vec3& d, const SurfacePoint& at, Supp
   return set_point(shape, d, at, jet.s, jet.su, jet.sv, s);
 }
 
+// No point of the body is higher along d than this, which is not below h, the height of one: h and `excess`,
+// or of a sphero-polyhedron less.
+double upper_bound(const Shape& shape, const Vec3& d, double h, double excess) {
+  const double roundoff = kRoundoff * shape.bounding_radius, upper = h + excess + roundoff;
+  const SpheroPolyhedron& core = shape.core;
+  if (!core.found()) return upper;
+  const double height = d.dot(core.points[core.support(d)]) + core.radius + core.error + roundoff;
+  return std::min(upper, std::max(h, height));
+}
+
 // Ascent from `at` to a local maximum of d . s; inside of a patch to a slope of `flat`.
 Support climb(const Shape& shape, const Vec3& d, SurfacePoint at, double flat = kSlopeTolerance) {
   Support best;
@@ -313,20 +323,12 @@ Support climb(const Shape& shape, const Vec3& d, SurfacePoint at, double flat = 
   const Normal normal = set_point(shape, d, at, jet.s, jet.su, jet.sv, &best);
   double excess = excess_at(shape, d, at, normal);
   if (excess > kRoundoff * size) excess = std::min(excess, crease_excess(shape, d, at, jet));
-  best.upper = f + excess + kRoundoff * size;
+  best.upper = upper_bound(shape, d, f, excess);
   return best;
 }
 
 double support_slack(const Shape& shape) {
   return kSupportSlack * kRoundoff * shape.bounding_radius;
-}
-
-// No point of the body is higher along d; infinite where that takes a search.
-double height_of_core(const Shape& shape, const Vec3& d) {
-  const SpheroPolyhedron& core = shape.core;
-  return core.found() ? d.dot(core.points[core.support(d)]) + core.radius + core.error +
-                            kRoundoff * shape.bounding_radius
-                      : std::numeric_limits<double>::infinity();
 }
 
 // Over all patches.
@@ -367,10 +369,7 @@ Support search_patches(const Shape& shape, const Vec3& d, const Support& low, co
 
 // A start if it is a point of the body; nullptr if not, or if its parameters are no numbers.
 const SurfacePoint* if_on_body(const Shape& shape, const SurfacePoint* start) {
-  const auto inside = [](double x) { return x >= 0 && x <= 1; };
-  const bool on = start && start->patch >= 0 && start->patch < static_cast<int>(shape.patches.size()) &&
-                  inside(start->u) && inside(start->v);
-  return on ? start : nullptr;
+  return start && lies_on(shape, *start) ? start : nullptr;
 }
 
 // From the start, or from the atlas. Bodies of bilinear patches have their support at a corner: nothing to
@@ -382,7 +381,7 @@ Support begin(const Shape& shape, const Vec3& d, const SurfacePoint* start, doub
   s.where = at;
   s.normal = d;
   s.h = d.dot(evaluate0(shape.patches[at.patch], at.u, at.v));
-  s.upper = std::numeric_limits<double>::infinity();
+  s.upper = upper_bound(shape, d, s.h, std::numeric_limits<double>::infinity());
   return s;
 }
 
@@ -411,8 +410,7 @@ bool find_on_meridian(const Shape& shape, const Vec3& d, const SurfacePoint* sta
 Support find_support(const Shape& shape, const Vec3& d, const SurfacePoint* start) {
   start = if_on_body(shape, start);
   if (Support s; find_on_meridian(shape, d, start, &s)) return s;
-  Support local = begin(shape, d, start);
-  local.upper = std::min(local.upper, std::max(local.h, height_of_core(shape, d)));
+  const Support local = begin(shape, d, start);
   if (is_certain(shape, local, 0) || (shape.dented() && std::isfinite(local.upper))) return local;
   return search_patches(shape, d, local, cell_of(shape, d));
 }
@@ -422,10 +420,8 @@ Support find_hull_support(const Shape& shape, const Vec3& d, const SurfacePoint*
   start = if_on_body(shape, start);
   if (Support s; find_on_meridian(shape, d, start, &s)) return s;
   Support local = begin(shape, d, start, flat);
-  local.upper = std::min(local.upper, std::max(local.h, height_of_core(shape, d)));
   if (!is_certain(shape, local, enough) && local.slope > kSlopeTolerance && std::isfinite(local.upper))
     local = climb(shape, d, local.where);
-  local.upper = std::min(local.upper, std::max(local.h, height_of_core(shape, d)));
   return is_certain(shape, local, enough) ? local : search_patches(shape, d, local, cell_of(shape, d));
 }
 
@@ -451,8 +447,7 @@ Support look_at(const Shape& shape, const Vec3& d, const SurfacePoint& at) {
 Support confirm_support(const Shape& shape, const Vec3& d, const SurfacePoint& at, double enough) {
   Support s;
   const Normal normal = set_point(shape, d, at, &s);
-  s.upper = s.h + excess_at(shape, d, at, normal) + kRoundoff * shape.bounding_radius;
-  s.upper = std::min(s.upper, std::max(s.h, height_of_core(shape, d)));
+  s.upper = upper_bound(shape, d, s.h, excess_at(shape, d, at, normal));
   s.converged = true;
   if (is_certain(shape, s, enough)) return s;
   if (Support found; find_on_meridian(shape, d, &at, &found)) return found;

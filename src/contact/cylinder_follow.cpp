@@ -78,7 +78,7 @@ class Follower {
   // Newton in the angle of c, by supports: also on creases and corners.
   bool by_supports() {
     SurfacePoint at = surface_point(memory_.on_b);
-    if (!lies_on(shape_, at)) return false;
+    if (!has_patch(shape_, at)) return false;
     if (shape_.support_excess > kSmallDent * tolerance_ * shape_.bounding_radius) return false;
     Vec3 y = pose_.apart + axes_ * (particle_.scale * evaluate0(shape_.patches[at.patch], at.u, at.v));
     y -= y.dot(pose_.axis) * pose_.axis;

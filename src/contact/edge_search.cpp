@@ -24,14 +24,6 @@ struct Feature {
   bool along_v() const { return edge < 2; }  // the edge's free parameter
 };
 
-bool lies_on(const Shape& shape, const SurfacePoint& at) {
-  return at.patch >= 0 && at.patch < static_cast<int>(shape.patches.size()) && at.on_patch();
-}
-
-bool opens(const EdgeLink& link) {
-  return link.kink > kSmoothKink;
-}
-
 // Puts a point that is all but on a sharp edge there.
 Feature feature_at(const Shape& shape, SurfacePoint* at) {
   Feature f;
@@ -40,7 +32,7 @@ Feature feature_at(const Shape& shape, SurfacePoint* at) {
   for (int edge = 0; edge < 4; ++edge) {
     if (end[edge] > kOnEdge) continue;
     const EdgeLink& link = shape.links[at->patch][edge];
-    if (!opens(link)) continue;
+    if (!link.opens()) continue;
     (edge < 2 ? at->u : at->v) = edge % 2;
     f.freedom = link.collapsed ? 0 : f.freedom - 1;
     f.edge = edge;
@@ -100,8 +92,8 @@ class EdgesAround {
     return false;
   }
   void add(const SurfacePoint& at, int edge) {
-    if (count_ < kMost && opens(shape_.links[at.patch][edge]) && !shape_.links[at.patch][edge].collapsed)
-      end_[count_++] = {at, edge};
+    const EdgeLink& link = shape_.links[at.patch][edge];
+    if (count_ < kMost && link.opens() && !link.collapsed) end_[count_++] = {at, edge};
   }
 
   const Shape& shape_;

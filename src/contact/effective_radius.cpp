@@ -39,7 +39,7 @@ SurfaceCurvature curvature_of_patch(const Particle& particle, const PointMemory&
   }
   using Slot = JetLanes::Slot;
   const SurfacePoint at = surface_point(point);
-  if (!lies_on(*particle.shape, at)) return {};
+  if (!has_patch(*particle.shape, at)) return {};
   const BezierPatch& patch = particle.shape->patches[at.patch];
   JetLanes jet;
   evaluate2(patch, at.u, at.v, &jet);

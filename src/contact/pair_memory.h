@@ -61,17 +61,12 @@ inline PointMemory point_memory(const SurfacePoint& at) {
   return {static_cast<double>(at.patch), at.u, at.v, {0, 0}, {0, 0}};
 }
 
-// Whether there is such a point: there is none at first, and a caller's memory may be of another shape.
-inline bool lies_on(const Shape& shape, const SurfacePoint& at) {
-  return at.patch >= 0 && at.patch < static_cast<int>(shape.patches.size());
-}
-
 // Where a surface point would be had it moved on as it last did, its step changing as it last did; if that
 // leaves the patch, where it was.
 inline SurfacePoint warm_point(const PointMemory& m, const Shape& shape) {
   const SurfacePoint last = surface_point(m),
                      next{last.patch, m.u + (m.step[0] + m.change[0]), m.v + (m.step[1] + m.change[1])};
-  if (!lies_on(shape, last)) return {};
+  if (!has_patch(shape, last)) return {};
   return next.on_patch() ? next : last;
 }
 inline void remember_point(const SurfacePoint& now, PointMemory* m) {

@@ -202,7 +202,7 @@ class Ladder {
     s.iterations = 0;
     s.points.on_a = surface_point(memory_.on_a);
     s.points.on_b = surface_point(memory_.on_b);
-    if (!lies_on(*pair.a, s.points.on_a) || !lies_on(*pair.b, s.points.on_b) ||
+    if (!has_patch(*pair.a, s.points.on_a) || !has_patch(*pair.b, s.points.on_b) ||
         !meet_bridge(pair, last_direction(pair), tolerance, settings_.tolerance, &s, &bridge))
       return false;
     *r = finish(pair, s, s.normal, Rung::warm, s.iterations);
@@ -321,8 +321,8 @@ class Ladder {
   // the surface.
   static bool is_on_surfaces(const PairFrame& pair, const PointPair& p) {
     const auto near = [&](const Shape& shape, const SurfacePoint& at, double scale, const Vec3& x) {
-      return lies_on(shape, at) && (scale * evaluate0(shape.patches[at.patch], at.u, at.v) - x).norm() <=
-                                       kOffSurface * scale * shape.bounding_radius;
+      return has_patch(shape, at) && (scale * evaluate0(shape.patches[at.patch], at.u, at.v) - x).norm() <=
+                                         kOffSurface * scale * shape.bounding_radius;
     };
     return near(*pair.a, p.on_a, pair.scale_a, p.a) &&
            near(*pair.b, p.on_b, pair.scale_b, pair.turn.transpose() * (p.b - pair.offset));

@@ -19,11 +19,6 @@ bool goes_on(const ContactBlock& block, int lane) {
          block.field[kPoints][lane] >= 0 && block.field[kPoints + 5][lane] >= 0;
 }
 
-// Those go on by their own Newton (contact/edge_search.h).
-bool is_sharp_there(const Shape& shape, const SurfacePoint& at) {
-  return !shape.edge_curves.empty() && is_on_edge(shape, at);
-}
-
 }  // namespace
 
 void ContactStages::follow_surfaces(ContactBlock& block, int first, Results& results) const {
@@ -43,7 +38,8 @@ void ContactStages::follow_surfaces(ContactBlock& block, int first, Results& res
     block.get(lane, kPoints, 10, points[l]);
     pairs.on_a[l] = warm_point(points[l][0], *pa.shape);
     pairs.on_b[l] = warm_point(points[l][1], *pb.shape);
-    if (is_sharp_there(*pa.shape, pairs.on_a[l]) || is_sharp_there(*pb.shape, pairs.on_b[l])) continue;
+    // Those go on by their own Newton.
+    if (is_on_edge(*pa.shape, pairs.on_a[l]) || is_on_edge(*pb.shape, pairs.on_b[l])) continue;
     pairs.a[l] = pa.shape;
     pairs.b[l] = pb.shape;
     pairs.scale_a[l] = pa.scale;
