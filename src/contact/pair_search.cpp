@@ -111,7 +111,16 @@ class Ladder {
     return true;
   }
 
-  // Rung 4: Newton from where the contact would be, had it moved on as it last did.
+  // Where the contact would be, had it moved on as it last did; nothing solved.
+  JointSolution warm_points(const PairFrame& pair) const {
+    JointSolution s;
+    s.iterations = 0;
+    s.points.on_a = warm_point(memory_.on_a, *pair.a);
+    s.points.on_b = warm_point(memory_.on_b, *pair.b);
+    return s;
+  }
+
+  // Rung 4: Newton from there.
   bool warm(const PairFrame& pair, double tolerance, ContactResult* r) {
     if (meet_on_flat(pair, tolerance, r) || stay_on_bridge(pair, tolerance, r) ||
         stay_on_edge(pair, tolerance, r))
@@ -134,10 +143,7 @@ class Ladder {
   // A face or a crease that the last direction belonged to.
   bool meet_on_flat(const PairFrame& pair, double tolerance, ContactResult* r) {
     if (!has_proof(memory_.proof) || (pair.a->flats.empty() && pair.b->flats.empty())) return false;
-    JointSolution s;
-    s.iterations = 0;
-    s.points.on_a = warm_point(memory_.on_a, *pair.a);
-    s.points.on_b = warm_point(memory_.on_b, *pair.b);
+    JointSolution s = warm_points(pair);
     if (!meet_flat(pair, last_direction(pair), tolerance, &s)) return false;
     *r = finish(pair, s, s.normal, Rung::warm, s.iterations);
     return true;
@@ -169,10 +175,7 @@ class Ladder {
   // The sharp edges or the vertex that the contact lay on the last time.
   bool stay_on_edge(const PairFrame& pair, double tolerance, ContactResult* r) {
     if ((pair.a->smooth && pair.b->smooth) || !has_proof(memory_.proof)) return false;
-    JointSolution s;
-    s.iterations = 0;
-    s.points.on_a = warm_point(memory_.on_a, *pair.a);
-    s.points.on_b = warm_point(memory_.on_b, *pair.b);
+    JointSolution s = warm_points(pair);
     if (!meet_edges(pair, last_direction(pair), tolerance, settings_.tolerance, &s)) return false;
     *r = finish(pair, s, s.normal, Rung::warm, s.iterations);
     return true;
