@@ -12,6 +12,12 @@
 #include "nurbs/wide.h"
 
 namespace nurbs {
+namespace {
+
+constexpr double kWidestCell = 0.3;  // parameter: what is between nodes further apart may be anywhere
+
+}  // namespace
+
 Vec3 DirectionAtlas::direction(int node) const {
   const int n = cells + 1;
   const int face = node / (n * n), i = node / n % n, j = node % n;
@@ -25,6 +31,30 @@ int DirectionAtlas::nearest(const Vec3& d) const {
   const int i = std::clamp(static_cast<int>((c.a + 1) * 2 * half + 1) / 2, 0, cells);
   const int j = std::clamp(static_cast<int>((c.b + 1) * 2 * half + 1) / 2, 0, cells);
   return (c.face * (cells + 1) + i) * (cells + 1) + j;
+}
+
+SurfacePoint DirectionAtlas::place(const Vec3& d) const {
+  const CubePoint c = to_cube(d);
+  if (!(c.major > 0)) return where[0];
+  const double half = 0.5 * cells, a = (c.a + 1) * half, b = (c.b + 1) * half;
+  const int i = std::clamp(static_cast<int>(a), 0, cells - 1),
+            j = std::clamp(static_cast<int>(b), 0, cells - 1);
+  const double s = a - i, t = b - j;
+  const SurfacePoint* const p = where.data() + (c.face * (cells + 1) + i) * (cells + 1) + j;
+  const SurfacePoint* const q = p + cells + 1;
+  const SurfacePoint& nearest = (s < 0.5 ? p : q)[t < 0.5 ? 0 : 1];
+  const double weight[4] = {(1 - s) * (1 - t), (1 - s) * t, s * (1 - t), s * t};
+  SurfacePoint between{nearest.patch, 0, 0};
+  for (int k = 0; k < 4; ++k) {
+    const SurfacePoint& node = (k < 2 ? p : q)[k % 2];
+    // At poles and seams parameters jump.
+    if (node.patch != nearest.patch ||
+        std::max(std::abs(node.u - nearest.u), std::abs(node.v - nearest.v)) > kWidestCell)
+      return nearest;
+    between.u += weight[k] * node.u;
+    between.v += weight[k] * node.v;
+  }
+  return between;
 }
 
 void DirectionAtlas::cell(const Vec3& d, int (&nodes)[4]) const {

@@ -38,6 +38,9 @@ struct DirectionAtlas {
   void support_upper(const Triple<Lane4>& d, Lane4* upper) const;  // of four at once
   // The node nearest to d; the (unnormalised) direction of a node: the largest component is +-1.
   int nearest(const Vec3& d) const;
+  // Where the support along d may lie: between the supports of the nodes around it, where one patch holds all
+  // four, else the nearest one's. A start for searches, second order in the nodes' distance. 15 ns.
+  SurfacePoint place(const Vec3& d) const;
   // The four nodes around d.
   void cell(const Vec3& d, int (&nodes)[4]) const;
   Vec3 direction(int node) const;

@@ -51,9 +51,16 @@ float threshold(double angle) {
 double upright_least(const CellBounds& b) {
   return b.stretch.least * std::cos(b.cone) * std::cos(b.cone);
 }
-// Four patches meet in a corner: no two normals there are further apart than their kinks together.
+// Where joints open, normals between their sides' are supported there. Four patches meet in a corner: no two
+// normals there are further apart than their kinks together.
+bool opens(const Shape& shape) {
+  return shape.proofs.opening > kNoKink;
+}
 double widest_kink(const Shape& shape) {
-  return kGapsCrossed * std::max(shape.proofs.opening, shape.proofs.closing);
+  return opens(shape) ? kGapsCrossed * std::max(shape.proofs.opening, shape.proofs.closing) : 0;
+}
+double least_of(const CellBounds& b) {
+  return std::max(b.min_radius, upright_least(b));
 }
 
 // The radii. Nodes lie in blocks, neighbours mostly: those too far from a leaf are left out as one.
@@ -87,8 +94,9 @@ class NodePainter {
         lower(b.axis, M_PI, 0);
         continue;
       }
-      lower(b.axis, b.cone, down(std::max(b.min_radius, upright_least(b))));
-      if (kink_at(shape_, leaf.cell) > kNoKink) lower(b.axis, b.cone + widest_kink(shape_), 0);
+      lower(b.axis, b.cone, down(least_of(b)));
+      if (opens(shape_) && kink_at(shape_, leaf.cell) > kNoKink)
+        lower(b.axis, b.cone + widest_kink(shape_), 0);
     }
     const double all = shape_.joints.none() ? shape_.patch_curvature.min_radius : 0;
     for (std::size_t i = 0; i < map_.nodes.size(); ++i)
@@ -140,8 +148,9 @@ class StretchPainter {
   void paint(const std::vector<Leaf>& leaves) {
     for (const Leaf& leaf : leaves) {
       const CellBounds& b = leaf.bounds;
-      lower(b, b.cone, b.regular ? down(upright_least(b)) : 0, true);
-      if (b.regular && kink_at(shape_, leaf.cell) > kNoKink) lower(b, b.cone + widest_kink(shape_), 0, false);
+      lower(b, b.cone, b.regular ? down(b.convex ? upright_least(b) : b.min_radius) : 0, true);
+      if (opens(shape_) && b.regular && kink_at(shape_, leaf.cell) > kNoKink)
+        lower(b, b.cone + widest_kink(shape_), 0, false);
     }
     begin();
     for (const Leaf& leaf : leaves) limit(leaf);
@@ -263,7 +272,7 @@ int InnerMap::cell(const Vec3& d) {
 
 InnerMap make_inner_map(const Shape& shape) {
   InnerMap map;
-  if (shape.dented() || shape.joint_slack > 0 || widest_kink(shape) > kWidestKink) return map;
+  if (shape.joint_slack > 0 || widest_kink(shape) > kWidestKink) return map;
   SurfaceBounds bounds = bound_surface(shape, shape.proofs.sphere, {false, true});
   // A leaf that may have any normal leaves no direction a radius.
   const auto tells = [](const Leaf& leaf) { return leaf.bounds.regular; };

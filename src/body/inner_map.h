@@ -27,7 +27,12 @@ constexpr int kStretchCells = 32;  // per cube edge
 // h'' + h >= radius[k] along great circles there (in the sense of measures: where a flat or a groove adds to
 // it, it adds what is positive), so that from `normal` on
 //     h(d) >= d.point + radius[k] (1 - d.normal)   for unit d within kInnerCaps[k] of it.
-// Hypotheses: the body is convex (not Shape::dented()), its joints meet, `point` is the support there.
+// Hypotheses: the body's joints meet, `point` is the support there. Of a dented body the same holds of its
+// convex hull, with W of the surface's own points: a support of the hull is a point of the surface where the
+// normal is d and no curvature is more than 1 / radius, so that the surface around it lies above a ball of
+// that radius that touches there, and h, which is no less than that ball's, bends from d by its radius at
+// least. (Not in a joint that closes: no support lies in there, but in one of its corners, where one side's
+// normal is d. Those are a few directions; h bends as it does for all others.)
 struct InnerNode {
   Vec3 point = Vec3::Zero();   // shape frame, scale 1
   Vec3 normal = Vec3::Zero();  // unit
@@ -54,7 +59,7 @@ void archive(Archive& a, InnerStretch& s) {
 }
 
 struct InnerMap {
-  std::vector<InnerNode> nodes;  // none: the hypotheses do not hold
+  std::vector<InnerNode> nodes;  // none: the hypotheses do not hold, or nothing is known
   std::vector<InnerStretch> stretches;
   static int cell(const Vec3& d);  // that d lies in
   static Vec3 middle(int cell);    // unit, at most 0.045 rad from all that lies in it

@@ -375,7 +375,7 @@ const SurfacePoint* if_on_body(const Shape& shape, const SurfacePoint* start) {
 // From the start, or from the atlas. Bodies of bilinear patches have their support at a corner: nothing to
 // climb.
 Support begin(const Shape& shape, const Vec3& d, const SurfacePoint* start, double flat = kSlopeTolerance) {
-  const SurfacePoint at = start ? *start : shape.atlas.where[shape.atlas.nearest(d)];
+  const SurfacePoint at = start ? *start : shape.atlas.place(d);
   if (!shape.bilinear) return climb(shape, d, at, flat);
   Support s;
   s.where = at;

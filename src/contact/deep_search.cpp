@@ -17,13 +17,16 @@ constexpr int kFirstDepth = 2;   // 96 cells
 constexpr int kNewtonDepth = 5;  // at which a cell that stays is looked into, and every other one below
 constexpr int kDeepest = 9;
 constexpr int kSupportDepth = 6;  // from which supports are evaluated
-constexpr int kMostSupports = 60;
+constexpr int kMostSupports = 28;
 constexpr int kMostCells = 800;
 constexpr int kMostNewtons = 12;
 constexpr int kMostCaps = 8;
 constexpr int kStretches = static_cast<int>(kStretchCaps.size()), kCaps = static_cast<int>(kInnerCaps.size());
 constexpr double kLeastCap = 0.012;  // rad: about the best minimum; less would leave thousands of cells
-constexpr double kWidestNearby = 0.4, kLeastNearby = 0.002, kNextNearby = 0.8;  // rad: caps by W alone
+constexpr double kSameLook = 0.993;  // cosine between directions that searches begin in
+constexpr double kWidestNearby = 0.4, kLeastNearby = 1e-4, kNextNearby = 0.8;  // rad: caps by W alone
+constexpr double kFurthest = 0.5;        // rad, that points alone may reach ...
+constexpr double kFurtherShare = 0.8;    // ... and of what they prove, so that something is left at the end
 constexpr double kFromThreshold = 0.25;  // of the tolerance, between the least p found and what is proven
 constexpr double kSlack = 0.02;          // of a stretch, given away for the tilt of its direction
 constexpr double kCapRoundoff = 1e-7;    // rad: angles are arc cosines
@@ -110,12 +113,13 @@ class DeepSearch {
         tolerance_(tolerance),
         noise_(8 * kRoundoff * pair.reach),
         widest_(pair.scale_a * pair.a->patch_curvature.max_radius +
-                pair.scale_b * pair.b->patch_curvature.max_radius) {}
+                pair.scale_b * pair.b->patch_curvature.max_radius),
+        dented_(pair.a->dented() || pair.b->dented()) {}
 
   bool run(JointSolution* best, DeepProof* proof) {
     keep_ = proof != nullptr;
     if (!serves()) return false;
-    if (best->iterations > 0) consider(*best);
+    if (best->iterations > 0) consider(confirmed(*best));
     if (!first_cells() || !rest()) return false;
     finish(best);
     if (keep_) fill(proof);
@@ -124,13 +128,13 @@ class DeepSearch {
 
   bool still_deepest(const DeepProof& proof, JointSolution* s) {
     if (!(proof.level > 0) || !serves()) return false;
-    const double least = -s->bracket.lower - kFromThreshold * tolerance_;
+    best_ = confirmed(*s);
+    const double least = -best_.bracket.lower - kFromThreshold * tolerance_;
     if (!(least > tolerance_ && least <= proof.level - moved(proof) - noise_)) return false;
     threshold_ = least;
     const Vec3 before(proof.direction[0], proof.direction[1], proof.direction[2]);
-    const double turned = angle_between(s->bracket.direction, before) + kCapRoundoff;
-    if (!(cap_about(*s).angle >= proof.angle + turned)) return false;
-    best_ = *s;
+    const double turned = angle_between(best_.bracket.direction, before) + kCapRoundoff;
+    if (!(cap_about(best_).angle >= proof.angle + turned)) return false;
     finish(s);
     return s->converged;
   }
@@ -148,7 +152,7 @@ class DeepSearch {
     return nearest(map, c.face, c.a, c.b);
   }
 
-  bool serves() const { return !inner_a_.nodes.empty() && !inner_b_.nodes.empty() && widest_ < kFarAway; }
+  bool serves() const { return !inner_a_.nodes.empty() && !inner_b_.nodes.empty(); }
   // What cells, and caps about all minima but the least, are proven to lie above.
   double level() const { return threshold_ + margin_; }
 
@@ -200,7 +204,7 @@ class DeepSearch {
     if (++supports_ > kMostSupports) return false;
     const Vec3 middle = corners.middle(), d = middle.normalized(), on_b = pair_.direction_on_b(d);
     const Radii r = radii(nearest(inner_a_, d), nearest(inner_b_, on_b), cap_of_depth(cell.depth()));
-    const auto [a, b] = hull_supports(pair_, d, &best_.base_a, &best_.base_b, tolerance_);
+    const auto [a, b] = hull_supports(pair_, d, nullptr, nullptr, tolerance_);
     const Vec3 g =
         pair_.place_a(a.point) - r.a * a.normal - pair_.place_b(b.point) + r.b * (pair_.turn * b.normal);
     return corners.above(g, r.level + noise_);
@@ -209,13 +213,23 @@ class DeepSearch {
   // Newton from the atlases' points nearest to a direction (of any length). False where the search can't go
   // on.
   bool look(const Vec3& d) {
-    if (++newtons_ > kMostNewtons) return false;
+    if (newtons_ == kMostNewtons) return false;
+    looked_[newtons_++] = d.normalized();
     const Shape &a = *pair_.a, &b = *pair_.b;
-    const JointSolution s = solve_joint(pair_, a.atlas.where[a.atlas.nearest(d)],
-                                        b.atlas.where[b.atlas.nearest(pair_.direction_on_b(d))], tolerance_,
-                                        kFarAway, kPolishIterations);
+    const JointSolution s = solve_joint(pair_, a.atlas.place(d), b.atlas.place(pair_.direction_on_b(d)),
+                                        tolerance_, kFarAway, kPolishIterations);
     iterations_ += s.iterations;
-    return !(s.stationary || s.converged) || consider(s);
+    return !(s.stationary || s.converged) || consider(confirmed(s));
+  }
+
+  // With the hulls' supports along its normal where dents may hide others, at points right to round-off.
+  JointSolution confirmed(const JointSolution& s) const {
+    if (!dented_) return s;
+    JointSolution again =
+        solve_joint(pair_, s.points.on_a, s.points.on_b, tolerance_, kFarAway, kPolishIterations);
+    confirm_lower(pair_, tolerance_, &again);
+    again.iterations += s.iterations;
+    return again;
   }
 
   // Takes a local minimum: lowers the threshold to it if it is the least, makes a cap. False where it is the
@@ -267,15 +281,14 @@ class DeepSearch {
     const Vec3& d = s.bracket.direction;
     const Vec3 g = s.jet_a.at(JetLanes::kS) - s.jet_b.at(JetLanes::kS), on_b = pair_.direction_on_b(d);
     const InnerNode &na = nearest(inner_a_, d), &nb = nearest(inner_b_, on_b);
-    const int cell_a = InnerMap::cell(d), cell_b = InnerMap::cell(on_b);
-    const InnerStretch &sa = inner_a_.stretches[cell_a], &sb = inner_b_.stretches[cell_b];
-    const auto off = [&](const Vec3& middle_a, const Vec3& middle_b) {
-      return std::acos(std::min(1.0, std::min(d.dot(middle_a), on_b.dot(middle_b)))) + kCapRoundoff;
-    };
-    const double off_node = off(na.normal, nb.normal),
-                 off_stretch = off(InnerMap::middle(cell_a), InnerMap::middle(cell_b));
-    const double y0 = d.dot(g),
-                 slope0 = -((g - y0 * d).norm() + widest_ * (std::sqrt(s.bracket.angle2) + kPoleNormal));
+    const Stretches near = stretches(d, on_b);
+    const Vec3 t = d.unitOrthogonal(), u = d.cross(t);
+    const double off_node = off(d, on_b, na.normal, nb.normal), off_stretch = near.off;
+    const LocalBend local = bend_at(s, t, u);
+    const double y0 = d.dot(g), angle = std::sqrt(s.bracket.angle2) + kPoleNormal;
+    double falls = (g - y0 * d).norm();
+    falls +=
+        (angle < local.reach ? std::min(widest_, local.turn.trace() + local.rate * angle) : widest_) * angle;
     const auto widen = [&](Reach at) {
       for (int n = 0; n < kStretches + kCaps; ++n) {
         // Over the stretches' caps, then the radii's; each by the narrowest that reach as far.
@@ -287,7 +300,7 @@ class DeepSearch {
         while (k < kStretches && kStretchCaps[k] - off_stretch < to) ++k;
         while (r < kCaps && kInnerCaps[r] - off_node < to) ++r;
         double m = 0;
-        if (k < kStretches) m = stretched(d, to, k, sa, sb);
+        if (k < kStretches) m = extremes(stretched(d, t, u, to, k, near)).least;
         if (r < kCaps) m = std::max(m, pair_.scale_a * na.radius[r] + pair_.scale_b * nb.radius[r]);
         // y'' + y = m. Falling, it has its least value where it turns; rising at first, at an end.
         const double above = at.y - m, slope = at.slope;
@@ -299,38 +312,72 @@ class DeepSearch {
       }
       return at;
     };
-    const Reach start{0, y0, slope0}, from = nearby(s, level, start);
-    Reach best = widen(start);
-    if (from.angle > 0)
-      if (const Reach other = widen(from); other.angle > best.angle) best = other;
+    const Reach from = nearby({0, y0, -falls}, local, level);
+    // Over dents another point may be the support from some angle on: no slope is known then but at d itself,
+    // where what the points lack of the supports, l, takes it down by no more than sqrt(2 l m), and where the
+    // points themselves are followed.
+    const double lack = dented_ ? -s.bracket.lower - y0 : 0,
+                 most = local.reach > 0 ? local.turn.trace() : kFarAway;
+    Reach best = widen({0, y0, lack > 0 ? -falls - std::sqrt(2 * lack * most) : -falls});
+    const Reach other = from.angle == 0 ? from : dented_ ? go_on(from, level) : widen(from);
+    if (other.angle > best.angle) best = other;
     return {best.angle, best.y - level};
+  }
+
+  // On, by the points that lie there alone: p is at least their distance, y'' + y = 0. Not as far as that
+  // comes down to the level again, so that cells there may lie above it.
+  Reach go_on(const Reach& at, double level) const {
+    const double most = std::hypot(at.y, at.slope), least = level + noise_;
+    if (!(at.slope > 0 && most > least)) return at;
+    const double turn = std::atan2(at.slope, at.y),
+                 further = std::min(kFurtherShare * (turn + std::acos(least / most)), kFurthest);
+    return {at.angle + further, most * std::cos(turn - further), -most * std::sin(further - turn)};
   }
 
   // From the start, d, by W at the points themselves and its rate, as far as that is known: for all t up to
   // the angle returned (0: none) y'' + y = m - rho t stays above the level,
   //     y >= y0 + s t + (m - y0) (1 - cos t) - rho t^3 / 6.
-  Reach nearby(const JointSolution& s, double level, const Reach& start) const {
-    const Vec3& d = s.bracket.direction;
-    const Vec3 t = d.unitOrthogonal(), u = d.cross(t);
-    const LocalBend a = local_bend(*pair_.a, pair_.scale_a, s.base_a, s.jet_a, d, t, u),
-                    b = local_bend(*pair_.b, pair_.scale_b, s.base_b, s.jet_b, -d, t, u);
-    const double reach = std::min({a.reach, b.reach, kWidestNearby}), rate = a.rate + b.rate,
-                 m = extremes(a.turn + b.turn).least, y0 = start.y, falls = std::max(0.0, -start.slope),
-                 room = y0 - level - noise_;
+  Reach nearby(const Reach& start, const LocalBend& local, double level) const {
+    const double m = extremes(local.turn).least, y0 = start.y, room = y0 - level - noise_;
     if (!(room > 0)) return {0, 0, 0};
-    for (double to = reach; to >= kLeastNearby; to *= kNextNearby) {
-      const double rise = m > y0 ? 1 - to * to / 12 : 1, bend = 0.5 * rise * (m - y0) - rate * to / 6;
-      if (!stays_above(room, falls, bend, to)) continue;
+    for (double to = local.reach; to >= kLeastNearby; to *= kNextNearby) {
+      const double rise = m > y0 ? 1 - to * to / 12 : 1, bend = 0.5 * rise * (m - y0) - local.rate * to / 6;
+      if (!stays_above(room, -start.slope, bend, to)) continue;
       const double c = std::cos(to), sine = std::sin(to);
-      return {to, y0 * c + start.slope * sine + m * (1 - c) - rate * to * to * to / 6,
-              (m - y0) * sine + start.slope * c - rate * to * to / 2};
+      return {to, y0 * c + start.slope * sine + m * (1 - c) - local.rate * to * to * to / 6,
+              (m - y0) * sine + start.slope * c - local.rate * to * to / 2};
     }
     return {0, 0, 0};
   }
 
-  // Least eigenvalue of W_A + W_B within `angle` of d. For a unit v square to a direction there, v = cos e u
-  // + sin e d with u square to d and |e| <= angle, so |f . v| >= cos(angle) |f . u| - sin(angle) |f . d|.
-  double stretched(const Vec3& d, double angle, int k, const InnerStretch& a, const InnerStretch& b) const {
+  // Of both bodies together.
+  LocalBend bend_at(const JointSolution& s, const Vec3& t, const Vec3& u) const {
+    const Vec3& d = s.bracket.direction;
+    const LocalBend a = local_bend(*pair_.a, pair_.scale_a, s.base_a, s.jet_a, d, t, u),
+                    b = local_bend(*pair_.b, pair_.scale_b, s.base_b, s.jet_b, -d, t, u);
+    return {a.turn + b.turn, a.rate + b.rate, std::min({a.reach, b.reach, kWidestNearby})};
+  }
+
+  // The stretches of a direction, and how far from their middles it is, rad.
+  struct Stretches {
+    const InnerStretch &a, &b;
+    double off;
+  };
+  Stretches stretches(const Vec3& d, const Vec3& on_b) const {
+    const int cell_a = InnerMap::cell(d), cell_b = InnerMap::cell(on_b);
+    return {inner_a_.stretches[cell_a], inner_b_.stretches[cell_b],
+            off(d, on_b, InnerMap::middle(cell_a), InnerMap::middle(cell_b))};
+  }
+  static double off(const Vec3& d, const Vec3& on_b, const Vec3& near_d, const Vec3& near_on_b) {
+    return std::acos(std::min(1.0, std::min(d.dot(near_d), on_b.dot(near_on_b)))) + kCapRoundoff;
+  }
+
+  // A lower bound, as a form in the plane of t and u, square to d, of W_A + W_B along great circles from d as
+  // far as `angle`. v = cos e x - sin e d goes on with the great circle that leaves d along x, so |f . v| >=
+  // cos e |f . x| - sin e |f . d|.
+  Mat2 stretched(const Vec3& d, const Vec3& t, const Vec3& u, double angle, int k,
+                 const Stretches& near) const {
+    const InnerStretch &a = near.a, &b = near.b;
     const Vec3 fa(a.along[0], a.along[1], a.along[2]);
     const Vec3 fb = pair_.turn * Vec3(b.along[0], b.along[1], b.along[2]);
     const double c2 = std::cos(angle) * std::cos(angle), s2 = 1 - c2;
@@ -338,10 +385,9 @@ class DeepSearch {
     const double ta = d.dot(fa), tb = d.dot(fb);
     const double lost = (1 / kSlack - 1) * s2 * (most_a * ta * ta + most_b * tb * tb);
     const double wa = (1 - kSlack) * c2 * most_a, wb = (1 - kSlack) * c2 * most_b;
-    const double half = 0.5 * (wa * (fa.squaredNorm() - ta * ta) + wb * (fb.squaredNorm() - tb * tb));
-    const double across = d.dot(fa.cross(fb)), det = wa * wb * across * across;
-    const double least = half - std::sqrt(std::max(0.0, half * half - det));
-    return pair_.scale_a * a.least[k] + pair_.scale_b * b.least[k] + least - lost;
+    const Vec2 xa(t.dot(fa), u.dot(fa)), xb(t.dot(fb), u.dot(fb));
+    return (pair_.scale_a * a.least[k] + pair_.scale_b * b.least[k] - lost) * Mat2::Identity() +
+           wa * xa * xa.transpose() + wb * xb * xb.transpose();
   }
 
   // The coarse cells; the lowest of those that stay is looked into first.
@@ -361,7 +407,20 @@ class DeepSearch {
         }
     cells_ = 6 * n * n;
     if (lowest.d.squaredNorm() > 0) look(refine_guess(pair_, lowest).d);
+    if (!closed_ && threshold_ < kFarAway) leave_saddle();
     return closed_;
+  }
+
+  // Downhill from what is stationary and no minimum.
+  void leave_saddle() {
+    const Vec3 d = best_.bracket.direction;
+    const Vec3 t = d.unitOrthogonal(), u = d.cross(t);
+    const LocalBend local = bend_at(best_, t, u);
+    const double least = extremes(local.turn).least, p = threshold_;
+    if (!(local.reach > 0 && least < p)) return;
+    const Vec2 axis = least_axis(local.turn, least);
+    for (const double step : {0.1, -0.1, 0.3, -0.3})
+      if (!look(d + step * (axis[0] * t + axis[1] * u)) || threshold_ < p) return;
   }
 
   bool rest() {
@@ -370,7 +429,7 @@ class DeepSearch {
       const DirectionCell cell = cell_[--count_];
       const Corners corners(cell);
       if (excluded(cell, corners)) continue;
-      if (cell.depth() >= kNewtonDepth && (cell.depth() - kNewtonDepth) % 2 == 0 && far_from_caps(corners)) {
+      if (cell.depth() >= kNewtonDepth && (cell.depth() - kNewtonDepth) % 2 == 0 && is_new(corners)) {
         const int caps = caps_;
         const double threshold = threshold_;
         if (!look(corners.middle())) return false;
@@ -390,11 +449,13 @@ class DeepSearch {
     return true;
   }
 
-  // Twice as far from every minimum as its cap reaches.
-  bool far_from_caps(const Corners& corners) const {
+  // Twice as far from every minimum as its cap reaches, and where no search has begun.
+  bool is_new(const Corners& corners) const {
     const Vec3 d = corners.middle().normalized();
     for (int k = 0; k < caps_; ++k)
       if (1 - d.dot(cap_[k].d) < 4 * (1 - cap_[k].cosine)) return false;
+    for (int k = 0; k < newtons_; ++k)
+      if (d.dot(looked_[k]) > kSameLook) return false;
     return true;
   }
 
@@ -411,6 +472,7 @@ class DeepSearch {
   const InnerMap &inner_a_, &inner_b_;
   const double tolerance_, noise_;
   const double widest_;  // sum of the bodies' largest curvature radii
+  const bool dented_;
   double threshold_ = kFarAway, margin_ = 0;
   bool keep_ = false;    // the proof is to outlive this step
   bool closed_ = false;  // the least minimum found has a cap, this one
@@ -420,6 +482,7 @@ class DeepSearch {
   JointSolution best_;
   int caps_ = 0, count_ = 0, cells_ = 0, newtons_ = 0, supports_ = 0, iterations_ = 0;
   Cap cap_[kMostCaps];
+  Vec3 looked_[kMostNewtons];  // where searches began
   DirectionCell cell_[6 * (1 << kFirstDepth) * (1 << kFirstDepth) + 4 * kDeepest];
 };
 

@@ -8,8 +8,8 @@ namespace nurbs {
 
 // Makes *best, a stationary pair or nothing (iterations 0), the global minimum of p(d) = h_A(d) + h_B(-d) -
 // d . offset, with a closed bracket; false, and *best as it was, where the proof does not succeed: bodies
-// with flats, sharp edges or dents, joints that gape, minima that are hardly ones or lie in creases. 5 to 20
-// us.
+// with flats or sharp edges, joints that gape, minima that are hardly ones or lie in creases or over dents. 5
+// to 20 us.
 //
 // Proof, for a depth T a quarter of `tolerance` below the least p found. The sphere of directions is covered
 // by
@@ -24,8 +24,11 @@ namespace nurbs {
 //     b any points of the bodies, and y'(0) = -s, s a bound of p's slope at d: |a - b across d| and the
 //     largest curvature radii times the angles between d and the normals at a and b. m comes from W at a and
 //     b, less its rate times the angle, as far as that is known, then from the nodes and cells nearest to d,
-//     in steps over their caps.
-// Hypotheses: those of the inner maps and rates, and finite curvature radii; all are checked. `proof`, if
+//     in steps over their caps. The first of these is of the points themselves, wherever they lie; of a
+//     dented body no step to the next is known, but p is no less than the overlap of the points reached,
+//     p'' + p = 0: about a minimum on a face, from which p rises as from a corner's, that reaches far.
+// Hypotheses: those of the inner maps and rates; all are checked. Minima of dented bodies are confirmed by
+// the hulls' supports. `proof`, if
 // asked for, is filled for the steps to come: cells then have to lie above T by a margin, and caps are cut,
 // which costs some more cells; its level is 0 where none is to be had, as of two minima as good as each
 // other.

@@ -279,4 +279,22 @@ JointSolution solve_joint(const PairFrame& pair, const SurfacePoint& on_a, const
   return out;
 }
 
+void confirm_lower(const PairFrame& pair, double tolerance, JointSolution* s) {
+  const double p =
+      confirmed_heights(s->side_a(pair), s->side_b(pair), tolerance) - s->normal.dot(pair.offset);
+  if (!(-p > s->bracket.lower)) return;
+  s->bracket.lower = -p;
+  s->bracket.direction = s->normal;
+}
+
+bool confirm_joint(const PairFrame& pair, double tolerance, JointSolution* s) {
+  const double excess = pair.scale_a * pair.a->support_excess + pair.scale_b * pair.b->support_excess;
+  if (!s->stationary || !dents_count(excess, tolerance) || s->bracket.width() > 2 * excess + tolerance)
+    return false;
+  confirm_lower(pair, tolerance, s);
+  s->converged = s->bracket.width() <= tolerance;
+  if (s->converged) s->gap = std::clamp(s->gap, s->bracket.lower, s->bracket.upper);
+  return s->converged;
+}
+
 }  // namespace nurbs

@@ -2,6 +2,7 @@
 #pragma once
 
 #include "contact/certificate.h"
+#include "contact/dents.h"
 #include "contact/pair_frame.h"
 
 namespace nurbs {
@@ -20,6 +21,11 @@ struct JointSolution {
   bool stationary = false;  // a common normal within kStationary, or what the last step makes one of next to
                             // a dent, certified or not
 
+  NormalSide side_a(const PairFrame& pair) const { return {*pair.a, pair.scale_a, normal, points.on_a}; }
+  NormalSide side_b(const PairFrame& pair) const {
+    return {*pair.b, pair.scale_b, pair.direction_on_b(normal), points.on_b};
+  }
+
   // Converged at points found in another way, after `solved` more systems. Their bracket is along the normal.
   void set_met(const PointPair& at, const Bracket& along, int solved);
 };
@@ -32,5 +38,16 @@ struct JointSolution {
 // (converged = false) after `cap` iterations or where the relative curvature is singular.
 JointSolution solve_joint(const PairFrame& pair, const SurfacePoint& on_a, const SurfacePoint& on_b,
                           double tolerance, double enough, int cap);
+
+// A common normal of bodies with dents is certified by the hulls' supports along it: raises the bracket's
+// lower end, where those are higher than what dents may hide leaves.
+void confirm_lower(const PairFrame& pair, double tolerance, JointSolution* s);
+// The same where it may close the bracket: whether it does.
+bool confirm_joint(const PairFrame& pair, double tolerance, JointSolution* s);
+// Whether dents of the bodies keep brackets open that the certificate makes.
+inline bool dents_count(const PairFrame& pair, double tolerance) {
+  return dents_count(pair.scale_a * pair.a->support_excess + pair.scale_b * pair.b->support_excess,
+                     tolerance);
+}
 
 }  // namespace nurbs

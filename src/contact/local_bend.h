@@ -18,6 +18,14 @@ inline Extremes extremes(const Mat2& m) {
   return {mean - spread, mean + spread};
 }
 
+// Unit eigenvector of the least eigenvalue, as extremes() has it.
+inline Vec2 least_axis(const Mat2& m, double least) {
+  const Vec2 x(m(0, 1), least - m(0, 0)), y(least - m(1, 1), m(0, 1));
+  const Vec2& longer = x.squaredNorm() > y.squaredNorm() ? x : y;
+  const double length = longer.norm();
+  return length > 0 ? Vec2(longer / length) : Vec2(1, 0);
+}
+
 // Of W, the inverse Weingarten map (the Hessian of the support function), in the plane square to d: for
 // directions within `reach` of d, rad, W is at least turn - rate times the angle, as forms.
 struct LocalBend {

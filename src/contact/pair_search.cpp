@@ -128,7 +128,7 @@ class Ladder {
     JointSolution s = solve_joint(pair, warm_point(memory_.on_a, *pair.a), warm_point(memory_.on_b, *pair.b),
                                   tolerance, settings_.reach, kWarmIterations);
     r->iterations = s.iterations;
-    if (!s.converged && !confirm(pair, tolerance, s)) {
+    if (!s.converged && !confirm_joint(pair, tolerance, &s)) {
       if (meet_edge(pair, tolerance, &s, r)) return true;
       if (!is_too_deep(s)) return false;
       *r = deep(pair, tolerance, s);
@@ -147,29 +147,6 @@ class Ladder {
     if (!meet_flat(pair, last_direction(pair), tolerance, &s)) return false;
     *r = finish(pair, s, s.normal, Rung::warm, s.iterations);
     return true;
-  }
-
-  static NormalSide side_a(const PairFrame& pair, const JointSolution& s) {
-    return {*pair.a, pair.scale_a, s.normal, s.points.on_a};
-  }
-  static NormalSide side_b(const PairFrame& pair, const JointSolution& s) {
-    return {*pair.b, pair.scale_b, pair.direction_on_b(s.normal), s.points.on_b};
-  }
-
-  // A common normal of bodies with dents is certified by the hulls' supports along it.
-  bool confirm(const PairFrame& pair, double tolerance, JointSolution& s) const {
-    const double excess = pair.scale_a * pair.a->support_excess + pair.scale_b * pair.b->support_excess;
-    if (!s.stationary || !dents_count(excess, tolerance) || s.bracket.width() > 2 * excess + tolerance)
-      return false;
-    const double p =
-        confirmed_heights(side_a(pair, s), side_b(pair, s), tolerance) - s.normal.dot(pair.offset);
-    if (-p > s.bracket.lower) {
-      s.bracket.lower = -p;
-      s.bracket.direction = s.normal;
-    }
-    s.converged = s.bracket.width() <= tolerance;
-    if (s.converged) s.gap = std::clamp(s.gap, s.bracket.lower, s.bracket.upper);
-    return s.converged;
   }
 
   // The sharp edges or the vertex that the contact lay on the last time.
@@ -238,7 +215,7 @@ class Ladder {
     const Support b = rough_support(*pair.b, on_b);
     if (b.normal.dot(on_b) < kOnFeature) return false;
     *joint = solve_joint(pair, a.where, b.where, tolerance, settings_.reach, kPolishIterations);
-    if (!joint->converged) confirm(pair, tolerance, *joint);
+    if (!joint->converged) confirm_joint(pair, tolerance, joint);
     *spent += joint->iterations;
     return true;
   }
@@ -439,7 +416,7 @@ class Ladder {
     const ModelSide b{*pair.b,     pair.scale_b, s.base_b, s.jet_b, pair.turn.transpose(),
                       pair.offset, turned2_b};
     if (!is_worth_a_model(a, b, s.gap, settings_.tolerance, pair.size)) return;
-    const double turn = s.dented ? turn_to_rival(side_a(pair, s), side_b(pair, s)) : kNormalMargin;
+    const double turn = s.dented ? turn_to_rival(s.side_a(pair), s.side_b(pair)) : kNormalMargin;
     make_local_model(a, b, 0.5 * s.bracket.unique, turn, &memory_.model);
   }
 

@@ -62,6 +62,7 @@ struct Bend {
 
 constexpr int kPaceFrom = 384, kPaceStep = 128;  // points at which the bracket's width is looked at
 constexpr int kPointAttempts = 2;                // flat differences of points may have no hull
+constexpr double kNearStart = 0.9995;            // cosine between directions nearer than the atlas's
 constexpr int kBeforeRings = 64;                 // queries before rings of directions are looked for
 constexpr int kBentBeforeRings = 95;             // ... of bodies without sharp edges, which caps may do for
 constexpr int kAtPoles = 256;                    // ... and where the least overlap is along an axis
@@ -326,9 +327,10 @@ class Search {
   double least_height() const { return std::max(0.25 * roundoff(), kLeastHeight * tolerance_); }
 
   // Support pair along unit d as a new point; tightens the lower bound of the gap. `near`: a point whose
-  // supports are worth starting from, or -1.
+  // supports are worth starting from where they are nearer than the atlas's, or -1.
   int query(const Vec3& d, int near) {
     if (hull_.points() == kHullVertices) return -1;
+    if (near >= 0 && d.dot(witness_[near].d) < kNearStart) near = -1;
     const HullPoint a = points_a_.along(d, near < 0 ? nullptr : &witness_[near].on_a),
                     b = points_b_.along(pair_.direction_on_b(d), near < 0 ? nullptr : &witness_[near].on_b);
     return take(d, a, b);
