@@ -7,6 +7,7 @@
 #include <functional>
 #include <limits>
 
+#include "body/joints.h"
 #include "body/local_form.h"
 #include "body/support.h"
 #include "nurbs/tolerances.h"
@@ -252,6 +253,21 @@ const Leaf* most_concave(const std::vector<Leaf>& leaves, double size) {
   return worst;
 }
 
+// Some points of every sharp edge that bends outward: faces that are ruled show no curvature there.
+std::vector<SurfacePoint> places_on_dented_edges(const PatchLinks& links,
+                                                 const std::vector<BezierPatch>& patches) {
+  std::vector<SurfacePoint> places;
+  visit_creases(links, [&](int patch, int edge) {
+    const std::vector<EdgePart> parts = find_dented_parts(patches[patch], edge);
+    if (parts.empty()) return;
+    for (const size_t k : {size_t{0}, parts.size() / 2, parts.size() - 1}) {
+      const Vec2 at = edge_parameters(edge, 0.5 * (parts[k].from + parts[k].to));
+      places.push_back({patch, at[0], at[1]});
+    }
+  });
+  return places;
+}
+
 }  // namespace
 
 Dent find_dent(const Shape& shape, const std::vector<SurfaceSample>& samples, const std::vector<Leaf>& leaves,
@@ -259,7 +275,9 @@ Dent find_dent(const Shape& shape, const std::vector<SurfaceSample>& samples, co
   const double size = shape.bounding_radius;
   const Leaf* inward = most_concave(leaves, size);
   const SurfaceSample& concave = most_concave(samples);
-  const bool suspect = inward || kinks.concave > kNoKink || concave.k_min < -kCurvatureNoise / size;
+  std::vector<SurfacePoint> places = places_on_dented_edges(shape.links, shape.patches);
+  const bool suspect =
+      inward || !places.empty() || kinks.concave > kNoKink || concave.k_min < -kCurvatureNoise / size;
   const Clouds clouds = choose(samples, suspect ? kPairsIfDented : kPairsIfConvex);
   const std::vector<double> support = sampled_support(clouds), depth = sampled_depth(clouds, support);
   std::vector<double> excess = support;
@@ -278,8 +296,7 @@ Dent find_dent(const Shape& shape, const std::vector<SurfaceSample>& samples, co
   const Clouds starts = choose(samples, kDentStarts);
   const Probe probe(shape, starts, step);
   SurfacePoint where;
-  std::vector<SurfacePoint> places = {clouds.places[highest], clouds.places[deepest], concave.where,
-                                      kinks.deepest};
+  places.insert(places.end(), {clouds.places[highest], clouds.places[deepest], concave.where, kinks.deepest});
   if (inward) places.push_back(inward->middle);
   dent.excess =
       std::max(dent.excess, worst_of([&](const auto& at) { return probe.excess(at); }, places, step, where));

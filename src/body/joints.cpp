@@ -14,6 +14,9 @@ namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
+constexpr int kDentHalvings = 6;  // of an edge, in search of what bends up
+constexpr double kBendNoise = 64;
+
 using Scalars = Bernstein<double>;
 using Vectors = Bernstein<Vec3>;
 
@@ -224,6 +227,47 @@ KinkBounds bound_kink(const BezierPatch& a, int edge, const BezierPatch& b, cons
   // Deeper than a gap: normals turn in a small part of uneven parameters.
   bound_meeting(m, 3 * kJointHalvings, &bounds.opening, &bounds.closing);
   return bounds;
+}
+
+namespace {
+
+// Along a part of an edge: a normal, and the curve's hodograph.
+struct Bending {
+  Vectors normal, hodograph;
+};
+
+void find_rising(const Bending& f, EdgePart range, int depth, std::vector<EdgePart>* parts) {
+  const Scalars bend = multiply(f.normal, derivative(f.hodograph), kDot);
+  const double noise = kBendNoise * kRoundoff * largest(f.normal) * largest(f.hodograph);
+  if (*std::max_element(bend.begin(), bend.end()) <= noise) return;
+  if (depth == 0) {
+    parts->push_back(range);
+    return;
+  }
+  auto [n0, n1] = halve(f.normal);
+  auto [h0, h1] = halve(f.hodograph);
+  const double middle = 0.5 * (range.from + range.to);
+  find_rising({std::move(n0), std::move(h0)}, {range.from, middle}, depth - 1, parts);
+  find_rising({std::move(n1), std::move(h1)}, {middle, range.to}, depth - 1, parts);
+}
+
+}  // namespace
+
+std::vector<EdgePart> find_dented_parts(const BezierPatch& patch, int edge) {
+  // Of even weights at both ends: uneven ones make uneven parts. The curve's derivative is N / w^2 with
+  // the hodograph N, so that along a normal, square to N, its second one is that of N' / w^2.
+  Homogeneous here = row(patch, edge, 0);
+  const int degree = static_cast<int>(here.size()) - 1;
+  const double ratio = std::pow(here.front()[3] / here.back()[3], 1.0 / degree);
+  count_from(Vec4(here.front()), &here);
+  Vectors normal = normal_along(patch, edge);
+  reparametrise(ratio, &here);
+  reparametrise(ratio, &normal);
+  std::vector<EdgePart> parts;
+  find_rising({normal, hodograph(here)}, {0, 1}, kDentHalvings, &parts);
+  const auto at = [ratio](double t) { return ratio * t / (1 + (ratio - 1) * t); };
+  for (EdgePart& part : parts) part = {at(part.from), at(part.to)};
+  return parts;
 }
 
 double bound_pole_spread(const BezierPatch& patch, int edge) {

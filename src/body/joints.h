@@ -2,6 +2,8 @@
 // their normals meet. From polynomials along the joint in Bernstein form, not from samples.
 #pragma once
 
+#include <vector>
+
 #include "body/shape.h"
 
 namespace nurbs {
@@ -21,6 +23,14 @@ struct KinkBounds {
   double opening = 0, closing = 0;
 };
 KinkBounds bound_kink(const BezierPatch& a, int edge, const BezierPatch& b, const EdgeLink& link);
+
+// Parts of an edge, ranges of its parameter, in which it may bend up along the outward normal of its patch,
+// which a convex body's do nowhere: there the normals between a sharp edge's sides belong to more points of
+// the body than one. Proven of the others, up to round-off.
+struct EdgePart {
+  double from, to;
+};
+std::vector<EdgePart> find_dented_parts(const BezierPatch& patch, int edge);
 
 // The same for the normals around a pole, which a collapsed edge is: no two of them make a larger angle.
 // Infinite where there is no limit of the normals, as on a flat patch's corner.

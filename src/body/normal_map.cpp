@@ -18,6 +18,8 @@ namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
+constexpr double kFanStep = 0.02;  // rad, between caps painted across a joint
+
 // Raises the radius of every cell that a cap of directions may touch.
 void paint(const Vec3& center, double angle, double radius, NormalMap& map) {
   const float value = std::nextafter(static_cast<float>(radius), std::numeric_limits<float>::infinity());
@@ -75,7 +77,7 @@ class Painter {
 
   // Creases that open are left as they are: on the surface at a small distance e outside they are tubes, and
   // corners at which all joints open are caps, of radius e and positive orientation, and in h'' + h they
-  // count with radius 0.
+  // count with radius 0. But a crease that runs through a dent makes a tube of negative orientation.
   void paint_joints() {
     const double gap = kJointRoundoff * shape_.bounding_radius;
     for (size_t p = 0; p < shape_.patches.size(); ++p)
@@ -83,6 +85,9 @@ class Painter {
         const EdgeLink& link = shape_.links[p][e];
         if (link.gap > gap || (link.kinked() && may_close(static_cast<int>(p), e)))
           paint_joint(static_cast<int>(p), e);
+        else if (shape_.dented() && link.kinked() && link.patch >= 0)
+          for (const EdgePart& part : find_dented_parts(shape_.patches[p], e))
+            paint_fan(static_cast<int>(p), e, part);
       }
   }
 
@@ -111,6 +116,27 @@ class Painter {
       const double half = kJointCapSafety * angle_between(middle, here);
       paint(middle, std::min(kNormalCap, step + half + kNormalMargin), kInfinity, map_);
       before = middle;
+    }
+  }
+
+  // The normals between both sides of a part of a joint, sampled at its ends and middle.
+  void paint_fan(int patch, int edge, const EdgePart& part) {
+    const EdgeLink& link = shape_.links[patch][edge];
+    Vec3 here[3], there[3];
+    for (int k = 0; k < 3; ++k) {
+      const Vec2 at = edge_parameters(edge, part.from + 0.5 * k * (part.to - part.from));
+      const SurfacePoint other = across(shape_.patches, link, {patch, at[0], at[1]}, edge);
+      here[k] = local_form(shape_.patches[patch], at[0], at[1]).normal;
+      there[k] = local_form(shape_.patches[link.patch], other.u, other.v).normal;
+    }
+    const double along = std::max({angle_between(here[0], here[1]), angle_between(here[1], here[2]),
+                                   angle_between(there[0], there[1]), angle_between(there[1], there[2])});
+    const double width = angle_between(here[1], there[1]);
+    const int caps = 1 + static_cast<int>(width / kFanStep);
+    for (int k = 0; k <= caps; ++k) {
+      const double t = width * k / caps;
+      const Vec3 n = (std::sin(width - t) * here[1] + std::sin(t) * there[1]).normalized();
+      wide_.paint(n, width / caps + kJointCapSafety * along + kNormalMargin, kInfinity, map_);
     }
   }
 

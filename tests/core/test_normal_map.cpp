@@ -1,7 +1,9 @@
 // The normal map's promise, against searches of the whole surface.
 #include <gtest/gtest.h>
 
+#include "body/joints.h"
 #include "nurbs/tolerances.h"
+#include "shapes/revolved.h"
 #include "support/bodies.h"
 #include "support/random.h"
 
@@ -66,6 +68,100 @@ TEST(NormalMap, promises_nothing_across_dents) {
 TEST(NormalMap, is_not_made_where_one_radius_serves) {
   EXPECT_EQ(smooth_pebble()->normal_map.cells, 0);
   EXPECT_EQ(ellipsoid()->normal_map.cells, 0);
+}
+
+// A block whose top is z = f(x) + g(y), sharp-edged: f of degree 4 with a dent in the middle for `dent` >
+// 0.01, g a parabola of height `crown` / 2, 0: the top is ruled. `uneven`: ratio of the weights along x,
+// which moves parameters and no point.
+struct Block {
+  double f[5], crown;
+  ShapePointer shape;
+
+  Block(double dent, double crown, double uneven) : f{0, 0.06, 0.06 - 5 * dent, 0.06, 0}, crown(crown) {
+    std::vector<NurbsSurface> s;
+    const double depth = 1;
+    const auto net = [&](int nx, int ny, const auto& point) {
+      std::vector<Vec4> points;
+      for (int i = 0; i <= nx; ++i)
+        for (int j = 0; j <= ny; ++j) {
+          const double w = std::pow(uneven, nx == 4 ? i / 4.0 : 0);
+          const Vec3 x = point(i, j);
+          points.emplace_back(w * x[0], w * x[1], w * x[2], w);
+        }
+      s.push_back(bezier_surface(nx, ny, points));
+    };
+    const auto top = [&](int i, int j) { return f[i] + (j == 1 ? crown : 0); };
+    net(4, 2, [&](int i, int j) { return Vec3(-1 + i / 2.0, -1 + j, top(i, j)); });
+    net(4, 2, [&](int i, int j) { return Vec3(-1 + i / 2.0, -1 + j, -depth); });
+    for (const int end : {0, 4})
+      net(2, 1, [&](int j, int k) { return Vec3(-1 + end / 2.0, -1 + j, k ? -depth : top(end, j)); });
+    for (const int end : {0, 2})
+      net(4, 1, [&](int i, int k) { return Vec3(-1 + i / 2.0, -1 + end, k ? -depth : top(i, end)); });
+    shape = make_shape("block", s);
+  }
+
+  // Of directions that look up, from the two polynomials alone.
+  double support(const Vec3& d) const {
+    const auto along_x = [&](double t) {
+      const double u = 1 - t;
+      const double z = f[0] * u * u * u * u + 4 * f[1] * u * u * u * t + 6 * f[2] * u * u * t * t +
+                       4 * f[3] * u * t * t * t + f[4] * t * t * t * t;
+      return d[0] * (2 * t - 1) + d[2] * z;
+    };
+    const int n = 1000;
+    double best = -1e300;
+    for (int i = 0; i <= n; ++i) {
+      const double here = along_x(double(i) / n);
+      if ((i > 0 && along_x((i - 1.0) / n) > here) || (i < n && along_x((i + 1.0) / n) > here)) continue;
+      double low = std::max(0.0, (i - 1.0) / n), high = std::min(1.0, (i + 1.0) / n);
+      for (int k = 0; k < 100; ++k) {
+        const double a = low + 0.382 * (high - low), b = low + 0.618 * (high - low);
+        (along_x(a) < along_x(b) ? low : high) = along_x(a) < along_x(b) ? a : b;
+      }
+      best = std::max(best, along_x(0.5 * (low + high)));
+    }
+    const double y = crown > 0 ? std::clamp(d[1] / (crown * d[2]), -1.0, 1.0) : (d[1] > 0 ? 1 : -1);
+    return best + d[1] * y + d[2] * 0.5 * crown * (1 - y * y) - d.dot(shape->mass.center);
+  }
+};
+
+// Between the sides of a sharp edge that runs through a dent two points of the edge compete.
+TEST(NormalMap, promises_nothing_on_edges_that_run_through_dents) {
+  Random random(6);
+  for (const double uneven : {1.0, 30.0, 3e3})
+    for (const double crown : {0.2, 0.0}) {
+      const Block block(0.014, crown, uneven);
+      EXPECT_GT(block.shape->concavity, 2e-4 * block.shape->bounding_radius) << uneven << " " << crown;
+      for (int k = 0; k < 3000; ++k) {
+        const Vec3 d =
+            Vec3((k % 2 ? 1 : -1) * random.log_uniform(1e-8, 0.1), random.uniform(-0.4, 0.4), 1).normalized();
+        const double h = block.support(d);
+        const Support found = find_hull_support(*block.shape, d);
+        ASSERT_NEAR(found.h, h, 1e-9) << d.transpose() << " uneven " << uneven << " crown " << crown;
+        ASSERT_GE(found.upper, h - 1e-12) << d.transpose();
+      }
+    }
+  const Block convex(0.009, 0.2, 1);
+  EXPECT_FALSE(convex.shape->dented());
+}
+
+TEST(DentedParts, are_those_of_dents) {
+  std::vector<ShapePointer> convex = all_shapes();
+  for (const ShapePointer& s :
+       {make_shape("cone", revolve({{{0, 0}, {}, {1, 0}, 0}, {{1, 0}, {}, {0, 2}, 0}})),
+        Block(0.009, 0.2, 1).shape, Block(0.009, 0.0, 1e3).shape, make_shape("lens", lens(1, 1.5, 0.05))})
+    convex.push_back(s);
+  for (const ShapePointer& shape : convex)
+    for (const BezierPatch& patch : shape->patches)
+      for (int edge = 0; edge < 4; ++edge)
+        EXPECT_TRUE(find_dented_parts(patch, edge).empty()) << shape->name << " edge " << edge;
+  for (const double uneven : {1.0, 1e3}) {
+    const Block block(0.014, 0.2, uneven);
+    int edges = 0;
+    for (const BezierPatch& patch : block.shape->patches)
+      for (int edge = 0; edge < 4; ++edge) edges += !find_dented_parts(patch, edge).empty();
+    EXPECT_GE(edges, 2) << "both edges of the top, at least";
+  }
 }
 
 }  // namespace
