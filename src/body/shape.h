@@ -182,6 +182,7 @@ struct Shape {
   Meridian meridian;                    // whose profile this is; empty for other bodies
   ProfileRadii profile_radii;           // of that
   SpheroPolyhedron core;                // hull of points, and a ball, that the body is, if it is one
+  BallHull ball_hull;                   // of a few balls, that the body is, if it is one
   std::vector<RoundEdges> round_edges;  // none of bodies of revolution
   EdgeCurves edge_curves;               // of sharp edges
   FlatFeatures flats;                   // faces, creases and ruled lines; empty for round bodies

@@ -19,6 +19,8 @@ constexpr double kOnBall = 1e-13;      // of the bounding radius: off a ball
 constexpr double kSameWeight = 1e-13;  // relative
 constexpr double kSamePoint = 1e-12;   // of the bounding radius: of corners
 constexpr double kTwoNormals = 1e-3;   // rad: closer ones give no radius
+constexpr int kHullSamples = 9;        // per patch and parameter
+constexpr double kMostOff = 1e-12;     // of the bounding radius: supports of the balls' hull and the body's
 
 struct Sample {
   Vec3 x, n;
@@ -102,19 +104,82 @@ class Finder {
 
   SpheroPolyhedron rounded() {
     out_.error = shape_.concavity + kJointRoundoff * shape_.bounding_radius;
-    for (const auto& links : shape_.links)
-      for (const EdgeLink& link : links)
-        if (!(std::abs(link.kink) <= kMostKink)) return {};
+    if (!is_smooth()) return {};
     take_radius();
-    if (!(out_.radius > 0) || !balls() || out_.points.empty()) return {};
-    for (int k = 0; k < static_cast<int>(shape_.patches.size()); ++k)
-      if (!on_ball_[k] && !is_between(k)) return {};
+    if (!(out_.radius > 0) || !balls() || out_.points.empty() || !all_between()) return {};
     out_.error += 0.5 * kMostKink * kMostKink * out_.radius;
     if (!(out_.error <= kMostError * shape_.bounding_radius)) return {};
     return out_;
   }
 
+  BallHull hull() {
+    BallHull out;
+    out.error = shape_.concavity + kJointRoundoff * shape_.bounding_radius;
+    if (!is_smooth() || !all_balls(&out) || out.centres.size() < 2 || !all_between()) return {};
+    const double off = off_hull(out);
+    if (!(off <= kMostOff * shape_.bounding_radius)) return {};
+    out.error += off;
+    return out.error <= kMostError * shape_.bounding_radius ? out : BallHull();
+  }
+
  private:
+  bool is_smooth() const {
+    for (const auto& links : shape_.links)
+      for (const EdgeLink& link : links)
+        if (!(std::abs(link.kink) <= kMostKink)) return false;
+    return true;
+  }
+  bool all_between() const {
+    for (int k = 0; k < static_cast<int>(shape_.patches.size()); ++k)
+      if (!on_ball_[k] && !is_between(k)) return false;
+    return true;
+  }
+
+  // Of any radii, those first whose patches tell most; false if there are too many.
+  bool all_balls(BallHull* out) {
+    const int count = static_cast<int>(shape_.patches.size());
+    std::vector<Curved> seen;
+    std::vector<int> order;
+    for (int k = 0; k < count; ++k) {
+      seen.push_back(curved(shape_.patches[k]));
+      order.push_back(k);
+    }
+    std::stable_sort(order.begin(), order.end(), [&](int x, int y) { return seen[x].angle > seen[y].angle; });
+    for (const int k : order) {
+      const BezierPatch& patch = shape_.patches[k];
+      const auto holds = [&](const Vec3& centre, double radius) {
+        return std::abs((sample(patch, 0.5, 0.5).x - centre).norm() - radius) <= kNearCentre * radius &&
+               is_on_ball(off_ball(patch, centre, radius), radius);
+      };
+      for (size_t i = 0; i < out->centres.size() && !on_ball_[k]; ++i)
+        on_ball_[k] = holds(out->centres[i], out->radii[i]);
+      if (on_ball_[k] || !(seen[k].radius > 0) || !(seen[k].angle > kTwoNormals)) continue;
+      const Sample middle = sample(patch, 0.5, 0.5);
+      const Vec3 centre = middle.x - seen[k].radius * middle.n;
+      if (!holds(centre, seen[k].radius)) continue;
+      if (static_cast<int>(out->centres.size()) == kMostBalls) return false;
+      out->centres.push_back(centre);
+      out->radii.push_back(seen[k].radius);
+      on_ball_[k] = true;
+    }
+    return true;
+  }
+
+  // By how much the supports of the balls' hull differ from the body's, at most, along its patches' normals.
+  double off_hull(const BallHull& hull) const {
+    double most = 0;
+    for (const BezierPatch& patch : shape_.patches)
+      for (int i = 0; i < kHullSamples; ++i)
+        for (int j = 0; j < kHullSamples; ++j) {
+          const Sample s = sample(patch, (i + 0.5) / kHullSamples, (j + 0.5) / kHullSamples);
+          double h = -kFarAway;
+          for (size_t k = 0; k < hull.centres.size(); ++k)
+            h = std::max(h, s.n.dot(hull.centres[k]) + hull.radii[k]);
+          most = std::max(most, std::abs(h - s.n.dot(s.x)));
+        }
+    return most;
+  }
+
   bool is_on_ball(double off, double radius) const {
     return off * radius <= kOnBall * shape_.bounding_radius;
   }
@@ -183,6 +248,10 @@ SpheroPolyhedron find_sphero_polyhedron(const Shape& shape) {
   if (shape.bilinear && std::all_of(shape.patches.begin(), shape.patches.end(), plane))
     return finder.polyhedron();
   return finder.rounded();
+}
+
+BallHull find_ball_hull(const Shape& shape) {
+  return shape.joint_slack > 0 || shape.bilinear ? BallHull() : Finder(shape).hull();
 }
 
 }  // namespace nurbs

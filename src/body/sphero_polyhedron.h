@@ -45,4 +45,23 @@ void archive(Archive& a, SpheroPolyhedron& s) {
 // Polyhedra: bilinear planar patches, whose corners are of the body and have it in their hull.
 SpheroPolyhedron find_sphero_polyhedron(const Shape& shape);
 
+// Hulls of a few balls of different radii, as tapered capsules are. For every unit d the body's support is
+// max over balls of d . centre + radius, within `error`. Lengths of the shape frame.
+struct BallHull {
+  std::vector<Vec3> centres;  // none: the body is no such one, or isn't known to be
+  std::vector<double> radii;
+  double error = 0;
+};
+template <class Archive>
+void archive(Archive& a, BallHull& s) {
+  auto& [centres, radii, error] = s;
+  a(centres, radii, error);
+}
+constexpr int kMostBalls = 4;
+
+// Of two to kMostBalls balls. Found by positions as sphero-polyhedra are: every patch is part of a ball,
+// proven, or planar, or straight one way between edges that it shares with those; that the hull of the balls
+// is the body is measured besides, at samples of every patch's points and normals.
+BallHull find_ball_hull(const Shape& shape);
+
 }  // namespace nurbs

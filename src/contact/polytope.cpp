@@ -8,6 +8,7 @@
 
 #include "body/cube_map.h"
 #include "body/hull_point.h"
+#include "contact/ball_hull_search.h"
 #include "contact/cell_search.h"
 #include "contact/growing_hull.h"
 #include "contact/local_bend.h"
@@ -886,7 +887,8 @@ PolytopeResult solve_polytope(const PairFrame& pair, const Vec3& seed, double to
   // its vertices moved at random by far more than round-off and far less than the tolerance (Barber, Dobkin &
   // Huhdanpaa 1996, section 4: joggled input); the upper bound allows for it.
   PolytopeResult best;
-  if (search_segments(pair, tolerance, &best) || search_segment_in_ellipsoid(pair, seed, tolerance, &best))
+  if (search_segments(pair, tolerance, &best) || search_ball_hulls(pair, tolerance, &best) ||
+      search_segment_in_ellipsoid(pair, seed, tolerance, &best))
     return best;
   Vec3 from = seed;
   bool points = true;

@@ -394,6 +394,17 @@ TEST(SavedCases, cones_tip_to_tip_on_nearly_one_axis) {
   expect_resolved({{"cone-tips-nearly-in-line.json", -1.178e-6}});
 }
 
+// Left unresolved: hulls of three balls of different radii, about one centre: overlaps are the same over
+// whole regions of directions.
+TEST(SavedCases, hulls_of_balls_about_one_centre) {
+  expect_resolved({{"three-ball-hull-twins.json", -0.419592284813}});
+}
+
+// Missed, and certified: a sharp edge that runs through a dent.
+TEST(SavedCases, an_edge_that_runs_through_a_dent) {
+  expect_resolved({{"dented-edge.json", -7.934827e-06}});
+}
+
 // Left unresolved: a cone's part makes a ring of directions alike that is no whole one.
 TEST(SavedCases, flat_valleys_of_sphericons) {
   expect_resolved({{"sphericon-twins.json", -0.0186263492}, {"vertex-in-sphericon.json", -0.013812608}});

@@ -146,5 +146,74 @@ TEST(SpheroPolyhedron, saved_pairs) {
   }
 }
 
+// Balls of radii `low` about the origin and `high` about (0, 0, length), and the cone between.
+Body tapered(double low, double high, double length) {
+  const double tilt = std::asin((low - high) / length);
+  const auto arc = [](double z, double r, double from, double to) {
+    const double half = 0.5 * (to - from), middle = 0.5 * (from + to);
+    const auto at = [&](double radius, double angle) {
+      return Vec2(std::abs(angle) > 0.5 * M_PI - 1e-9 ? 0 : radius * std::cos(angle),
+                  z + radius * std::sin(angle));
+    };
+    return ProfileArc{at(r, from), at(r / std::cos(half), middle), at(r, to), std::cos(half)};
+  };
+  const double pole = 0.5 * M_PI, turn = 0.5 * (tilt - pole);
+  Profile profile = {arc(0, low, -pole, turn), arc(0, low, turn, tilt), {}, arc(length, high, tilt, pole)};
+  profile[2] = {profile[1].to, Vec2::Zero(), profile[3].from, 0};
+  return make_shape("tapered capsule", revolve(profile));
+}
+
+TEST(BallHull, of_tapered_capsules) {
+  const Body body = tapered(1, 0.5, 1.5);
+  ASSERT_EQ(body->ball_hull.centres.size(), 2u);
+  const bool first = body->ball_hull.radii[0] > 0.75;
+  EXPECT_NEAR(body->ball_hull.radii[first ? 0 : 1], 1, 1e-12);
+  EXPECT_NEAR(body->ball_hull.radii[first ? 1 : 0], 0.5, 1e-12);
+  EXPECT_LT((body->ball_hull.centres[first ? 0 : 1] + body->mass.center).norm(), 1e-12);
+  for (const Vec3& d : test::spiral(2000))
+    EXPECT_NEAR(find_hull_support(*body, d).h, std::max(1.0, 0.5 + 1.5 * d[2]) - d.dot(body->mass.center),
+                1e-12);
+  for (const Body& other :
+       {make_shape("egg", egg(1, 0.9, 0.5)), make_shape("tablet", tablet(1, 1, 0.2)),
+        make_shape("capsule", capsule(0.5, 2)), make_shape("pebble", pebble()), rounded("tetrahedron", 0.1)})
+    EXPECT_TRUE(other->ball_hull.centres.empty()) << other->name;
+}
+
+// Against supports that know nothing of balls: the overlap along the normal is the one found, and no
+// direction of thousands, nor the best of them refined, has less.
+TEST(BallHull, contacts_of_two_are_least_overlaps) {
+  Random random(8);
+  const std::vector<Body> bodies = {tapered(1, 0.5, 1.5),
+                                    tapered(0.8, 0.3, 1),
+                                    tapered(1, 0.9, 0.3),
+                                    make_shape("capsule", capsule(0.5, 2)),
+                                    make_shape("ball", exact_ellipsoid({0.7, 0.7, 0.7})),
+                                    rounded("tetrahedron", 0.1)};
+  const std::vector<Vec3> spiral = test::spiral(1500);
+  for (int k = 0; k < 240; ++k) {
+    const Shape &sa = *bodies[random.below(3)], &sb = *bodies[random.below(6)];
+    Particle a{&sa, 1, Vec3::Zero(), random.turn()},
+        b{&sb, random.log_uniform(0.3, 3), Vec3::Zero(), random.turn()};
+    if (k % 4 == 1) b.q = a.q;
+    const double off[] = {0, 1e-8, 1e-5, 1e-3, 0.03, 0.3, 1, 2.2};
+    // About the big balls' centres, or the centres of mass.
+    const Vec3 centre_a = k % 3 ? Vec3(a.q * -sa.mass.center) : Vec3(Vec3::Zero()),
+               centre_b = k % 3 ? Vec3(b.scale * (b.q * -sb.mass.center)) : Vec3(Vec3::Zero());
+    b.x = centre_a - centre_b + off[k % 8] * random.direction();
+    double memory[kPairMemorySize] = {0};
+    const ContactResult r = find_contact(a, b, ContactSettings(), memory);
+    ASSERT_EQ(r.status, Status::converged) << k;
+    const auto overlap = [&](const Vec3& d) {
+      return find_hull_support(sa, a.q.conjugate() * d).h +
+             b.scale * find_hull_support(sb, b.q.conjugate() * -d).h - d.dot(b.x);
+    };
+    const double size = std::min(sa.bounding_radius, b.scale * sb.bounding_radius);
+    EXPECT_NEAR(overlap(r.normal), -r.gap, 1e-9 * size) << k;
+    EXPECT_GE(test::least_overlap(overlap, spiral, test::Compass(), random), -r.gap - 1e-9 * size) << k;
+    EXPECT_NEAR(r.normal.dot(r.point_b - r.point_a), r.gap, 1e-12 * size + 1e-12) << k;
+    EXPECT_LT((r.point_b - r.point_a).cross(r.normal).norm(), 1e-5 * size) << k << " gap " << r.gap;
+  }
+}
+
 }  // namespace
 }  // namespace nurbs

@@ -1,0 +1,180 @@
+// Every direction at which one, two or three balls' overlaps are stationary together; see ball_hull_search.h.
+#include "contact/ball_hull_search.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "contact/growing_hull.h"
+
+namespace nurbs {
+namespace {
+
+constexpr int kMostTerms = kMostBalls * kMostBalls;
+constexpr double kSameLine = 1e-15;  // sine between differences of centres: circles that are parallel
+constexpr double kTouching = 1e-13;  // of a length of 1: circles that touch
+
+struct Balls {
+  int count = 0;
+  Vec3 centre[kMostBalls];  // pair frame
+  double radius[kMostBalls];
+  double error = 0;
+
+  Balls(const Shape& shape, double scale, const Mat3& turn, const Vec3& offset) {
+    const SpheroPolyhedron& core = shape.core;
+    const BallHull& hull = shape.ball_hull;
+    const std::vector<Vec3>& centres = core.found() ? core.points : hull.centres;
+    if (centres.size() > kMostBalls) return;
+    count = static_cast<int>(centres.size());
+    for (int k = 0; k < count; ++k) {
+      centre[k] = offset + scale * (turn * centres[k]);
+      radius[k] = scale * (core.found() ? core.radius : hull.radii[k]);
+    }
+    error = scale * (core.found() ? core.error : hull.error);
+  }
+};
+
+class BallHullSearch {
+ public:
+  BallHullSearch(const PairFrame& pair, const Balls& a, const Balls& b)
+      : a_(a), b_(b), reach_(pair.reach), noise_(a.error + b.error + 16 * kRoundoff * pair.reach) {
+    for (int i = 0; i < a.count; ++i)
+      for (int j = 0; j < b.count; ++j) {
+        term_[count_].g = a.centre[i] - b.centre[j];
+        term_[count_].radius = a.radius[i] + b.radius[j];
+        ++count_;
+      }
+  }
+
+  // False where round-off leaves it open.
+  bool run() {
+    consider(Vec3::UnitX(), 0, 0, 0);
+    for (int i = 0; i < count_; ++i) {
+      if (const double length = term_[i].g.norm(); length > kNoDirection * reach_)
+        consider(-term_[i].g / length, i, i, i);
+      for (int j = i + 1; j < count_; ++j) {
+        level_of_two(i, j);
+        for (int k = j + 1; k < count_; ++k)
+          if (!level_of_three(i, j, k)) return false;
+      }
+    }
+    return true;
+  }
+
+  void fill(PolytopeResult* r) const {
+    r->bracket.direction = direction_;
+    r->bracket.lower = -least_ - noise_;
+    r->bracket.upper = -least_ + noise_;
+    r->gap = -least_;
+    r->points.na = direction_;
+    r->points.nb = -direction_;
+    r->points.a = r->points.b = Vec3::Zero();
+    for (int n = 0; n < 3; ++n) {
+      const int i = active_[n] / b_.count, j = active_[n] % b_.count;
+      r->points.a += weights_[n] * (a_.centre[i] + a_.radius[i] * direction_);
+      r->points.b += weights_[n] * (b_.centre[j] - b_.radius[j] * direction_);
+    }
+    part_points(r);
+  }
+  double width() const { return 2 * noise_; }
+
+ private:
+  struct Term {
+    Vec3 g;
+    double radius;
+  };
+
+  double overlap(const Vec3& d) const {
+    double most = -kFarAway;
+    for (int k = 0; k < count_; ++k) most = std::max(most, d.dot(term_[k].g) + term_[k].radius);
+    return most;
+  }
+
+  // Of directions as good as each other that at which the terms' gradients cancel best.
+  void consider(const Vec3& d, int i, int j, int k) {
+    const double p = overlap(d);
+    if (p > least_ + noise_) return;
+    const auto across = [&](int n) -> Vec3 { return term_[n].g - d.dot(term_[n].g) * d; };
+    const Vec3 x = across(i), y = across(j), z = across(k);
+    Vec3 weights(1, 0, 0);
+    if (i != j) weights = nearest_on_triangle(x, y, z);
+    const double off = (weights[0] * x + weights[1] * y + weights[2] * z).norm();
+    if (!(p < least_ - noise_ || off < off_)) return;
+    least_ = std::min(p, least_ + noise_);
+    off_ = off;
+    direction_ = d;
+    weights_ = weights;
+    active_[0] = i;
+    active_[1] = j;
+    active_[2] = k;
+  }
+
+  // d . x = level of unit d.
+  struct Circle {
+    Vec3 x;
+    double level;
+  };
+  Circle level(int i, int j) const { return {term_[i].g - term_[j].g, term_[j].radius - term_[i].radius}; }
+
+  void level_of_two(int i, int j) {
+    const Circle c = level(i, j);
+    const double length = c.x.norm();
+    if (!(length > kNoDirection * reach_) || std::abs(c.level) > length * (1 + kTouching)) return;
+    const Vec3 u = c.x / length;
+    const double cosine = std::clamp(c.level / length, -1.0, 1.0), sine = std::sqrt(1 - cosine * cosine);
+    Vec3 e = term_[i].g - u.dot(term_[i].g) * u;
+    const double across = e.norm();
+    e = across > kNoDirection * reach_ ? Vec3(e / across) : u.unitOrthogonal();
+    for (const double side : {-1.0, 1.0}) consider((cosine * u + side * sine * e).normalized(), i, j, j);
+  }
+
+  bool level_of_three(int i, int j, int k) {
+    const Circle c = level(i, j), d = level(i, k);
+    const Vec3 normal = c.x.cross(d.x);
+    const double n2 = normal.squaredNorm(), lengths2 = c.x.squaredNorm() * d.x.squaredNorm();
+    if (!(n2 > kSameLine * kSameLine * lengths2)) return true;
+    const Vec3 over = d.x.cross(normal) / n2, under = normal.cross(c.x) / n2;
+    const auto meeting = [&](double at_c, double at_d) -> Vec3 { return at_c * over + at_d * under; };
+    Vec3 foot = meeting(c.level, d.level);
+    foot += meeting(c.level - c.x.dot(foot), d.level - d.x.dot(foot));
+    const double rest = 1 - foot.squaredNorm();
+    if (rest < -kTouching * std::sqrt(lengths2 / n2)) return true;
+    const double height = std::sqrt(std::max(0.0, rest) / n2);
+    for (const double side : {-height, height}) {
+      const Vec3 there = (foot + side * normal).normalized();
+      if (std::max(std::abs(c.x.dot(there) - c.level), std::abs(d.x.dot(there) - d.level)) > noise_)
+        return false;
+      consider(there, i, j, k);
+    }
+    return true;
+  }
+
+  const Balls &a_, &b_;
+  const double reach_, noise_;
+  int count_ = 0;
+  Term term_[kMostTerms];
+  double least_ = kFarAway, off_ = kFarAway;
+  Vec3 direction_ = Vec3::UnitX(), weights_ = Vec3::UnitX();
+  int active_[3] = {0, 0, 0};
+};
+
+}  // namespace
+
+bool search_ball_hulls(const PairFrame& pair, double tolerance, PolytopeResult* result) {
+  const auto is_hull = [](const Shape& s) { return !s.ball_hull.centres.empty(); };
+  if (!is_hull(*pair.a) && !is_hull(*pair.b)) return false;  // of points and a ball the polytope is
+  const auto is_one = [&](const Shape& s) { return s.core.found() || is_hull(s); };
+  if (!is_one(*pair.a) || !is_one(*pair.b)) return false;
+  const Balls a(*pair.a, pair.scale_a, Mat3::Identity(), Vec3::Zero()),
+      b(*pair.b, pair.scale_b, pair.turn, pair.offset);
+  if (a.count == 0 || b.count == 0) return false;
+  BallHullSearch search(pair, a, b);
+  if (!(search.width() <= 0.5 * tolerance) || !search.run()) return false;
+  search.fill(result);
+  result->converged = result->closed = true;
+  result->iterations = 1;
+  result->points.on_a = find_feature_support(*pair.a, result->points.na).where;
+  result->points.on_b = find_feature_support(*pair.b, pair.direction_on_b(result->points.na)).where;
+  return true;
+}
+
+}  // namespace nurbs
