@@ -96,7 +96,13 @@ class BallHullSearch {
     const auto across = [&](int n) -> Vec3 { return term_[n].g - d.dot(term_[n].g) * d; };
     const Vec3 x = across(i), y = across(j), z = across(k);
     Vec3 weights(1, 0, 0);
-    if (i != j) weights = nearest_on_triangle(x, y, z);
+    if (j != k) {
+      weights = nearest_on_triangle(x, y, z);
+    } else if (const double apart2 = (x - y).squaredNorm(); apart2 > 0) {
+      weights[1] = std::clamp(x.dot(x - y) / apart2, 0.0, 1.0);
+      weights[0] = 1 - weights[1];
+    }
+    if (!weights.allFinite()) weights = Vec3(1, 0, 0);  // on one line
     const double off = (weights[0] * x + weights[1] * y + weights[2] * z).norm();
     if (!(p < least_ - noise_ || off < off_)) return;
     least_ = std::min(p, least_ + noise_);
