@@ -135,7 +135,8 @@ class Painter {
     const int caps = 1 + static_cast<int>(width / kFanStep);
     for (int k = 0; k <= caps; ++k) {
       const double t = width * k / caps;
-      const Vec3 n = (std::sin(width - t) * here[1] + std::sin(t) * there[1]).normalized();
+      const Vec3 between = std::sin(width - t) * here[1] + std::sin(t) * there[1],
+                 n = width > kNoKink ? Vec3(between.normalized()) : here[1];
       wide_.paint(n, width / caps + kJointCapSafety * along + kNormalMargin, kInfinity, map_);
     }
   }
