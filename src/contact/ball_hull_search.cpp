@@ -45,7 +45,7 @@ class BallHullSearch {
       }
   }
 
-  // False where round-off leaves it open.
+  // False where round-off leaves it open, or no balls that touch along the direction.
   bool run() {
     consider(Vec3::UnitX(), 0, 0, 0);
     for (int i = 0; i < count_; ++i) {
@@ -57,14 +57,14 @@ class BallHullSearch {
           if (!level_of_three(i, j, k)) return false;
       }
     }
-    return true;
+    return off_ < kFarAway;
   }
 
   void fill(PolytopeResult* r) const {
     r->bracket.direction = direction_;
-    r->bracket.lower = -least_ - noise_;
+    r->bracket.lower = -there_ - noise_;
     r->bracket.upper = -least_ + noise_;
-    r->gap = -least_;
+    r->gap = -there_;
     r->points.na = direction_;
     r->points.nb = -direction_;
     r->points.a = r->points.b = Vec3::Zero();
@@ -75,7 +75,7 @@ class BallHullSearch {
     }
     part_points(r);
   }
-  double width() const { return 2 * noise_; }
+  double width() const { return 4 * noise_; }  // at most
 
  private:
   struct Term {
@@ -89,10 +89,11 @@ class BallHullSearch {
     return most;
   }
 
-  // Of directions as good as each other that at which the terms' gradients cancel best.
+  // Of directions as good as each other that at which the terms' gradients cancel best, if those terms are
+  // the largest there.
   void consider(const Vec3& d, int i, int j, int k) {
-    const double p = overlap(d);
-    if (p > least_ + noise_) return;
+    const double p = overlap(d), level = 2 * noise_;
+    if (p > least_ + level) return;
     const auto across = [&](int n) -> Vec3 { return term_[n].g - d.dot(term_[n].g) * d; };
     const Vec3 x = across(i), y = across(j), z = across(k);
     Vec3 weights(1, 0, 0);
@@ -102,16 +103,19 @@ class BallHullSearch {
       weights[1] = std::clamp(x.dot(x - y) / apart2, 0.0, 1.0);
       weights[0] = 1 - weights[1];
     }
-    if (!weights.allFinite()) weights = Vec3(1, 0, 0);  // on one line
-    const double off = (weights[0] * x + weights[1] * y + weights[2] * z).norm();
-    if (!(p < least_ - noise_ || off < off_)) return;
-    least_ = std::min(p, least_ + noise_);
-    off_ = off;
-    direction_ = d;
-    weights_ = weights;
-    active_[0] = i;
-    active_[1] = j;
-    active_[2] = k;
+    double off = (weights[0] * x + weights[1] * y + weights[2] * z).norm();
+    const auto largest = [&](int n) { return d.dot(term_[n].g) + term_[n].radius >= p - level; };
+    if (!(off < kFarAway && largest(i) && largest(j) && largest(k))) off = kFarAway;
+    if (p < least_ - level || off < off_) {
+      off_ = off;
+      direction_ = d;
+      there_ = p;
+      weights_ = weights;
+      active_[0] = i;
+      active_[1] = j;
+      active_[2] = k;
+    }
+    least_ = std::min(p, least_);
   }
 
   // d . x = level of unit d.
@@ -129,7 +133,12 @@ class BallHullSearch {
     const double cosine = std::clamp(c.level / length, -1.0, 1.0), sine = std::sqrt(1 - cosine * cosine);
     Vec3 e = term_[i].g - u.dot(term_[i].g) * u;
     const double across = e.norm();
-    e = across > kNoDirection * reach_ ? Vec3(e / across) : u.unitOrthogonal();
+    if (across > kNoDirection * reach_) {
+      e /= across;
+      e = (e - u.dot(e) * u).normalized();  // what cancelled of it left it hardly square to u
+    } else {
+      e = u.unitOrthogonal();
+    }
     for (const double side : {-1.0, 1.0}) consider((cosine * u + side * sine * e).normalized(), i, j, j);
   }
 
@@ -158,7 +167,8 @@ class BallHullSearch {
   const double reach_, noise_;
   int count_ = 0;
   Term term_[kMostTerms];
-  double least_ = kFarAway, off_ = kFarAway;
+  double least_ = kFarAway, there_ = kFarAway;  // overlap, and in the direction chosen
+  double off_ = kFarAway;                       // what its gradients leave
   Vec3 direction_ = Vec3::UnitX(), weights_ = Vec3::UnitX();
   int active_[3] = {0, 0, 0};
 };

@@ -191,7 +191,7 @@ TEST(BallHull, contacts_of_two_are_least_overlaps) {
                                     rounded("tetrahedron", 0.1)};
   const std::vector<Vec3> spiral = test::spiral(1500);
   for (int k = 0; k < 240; ++k) {
-    const Shape &sa = *bodies[random.below(3)], &sb = *bodies[random.below(6)];
+    const Shape &sa = *bodies[random.below(3)], &sb = k % 8 == 1 ? sa : *bodies[random.below(6)];
     Particle a{&sa, 1, Vec3::Zero(), random.turn()},
         b{&sb, random.log_uniform(0.3, 3), Vec3::Zero(), random.turn()};
     if (k % 4 == 1) b.q = a.q;
@@ -211,6 +211,8 @@ TEST(BallHull, contacts_of_two_are_least_overlaps) {
     EXPECT_NEAR(overlap(r.normal), -r.gap, 1e-9 * size) << k;
     EXPECT_GE(test::least_overlap(overlap, spiral, test::Compass(), random), -r.gap - 1e-9 * size) << k;
     EXPECT_NEAR(r.normal.dot(r.point_b - r.point_a), r.gap, 1e-12 * size + 1e-12) << k;
+    EXPECT_NEAR(r.normal.dot(r.point_a), find_hull_support(sa, a.q.conjugate() * r.normal).h, 1e-9 * size)
+        << k;
     EXPECT_LT((r.point_b - r.point_a).cross(r.normal).norm(), 1e-5 * size) << k << " gap " << r.gap;
   }
 }
