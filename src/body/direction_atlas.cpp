@@ -16,6 +16,19 @@ namespace {
 
 constexpr double kWidestCell = 0.3;  // parameter: what is between nodes further apart may be anywhere
 
+// Where in a cell a direction lies: the number of its first node, and how far on, of a cell, towards the next
+// row and the next node of a row.
+struct Place {
+  int first;
+  double s, t;
+};
+NURBS_INLINE Place place_in(const CubePoint& c, int cells) {
+  const double half = 0.5 * cells, a = (c.a + 1) * half, b = (c.b + 1) * half;
+  const int i = std::clamp(static_cast<int>(a), 0, cells - 1),
+            j = std::clamp(static_cast<int>(b), 0, cells - 1);
+  return {(c.face * (cells + 1) + i) * (cells + 1) + j, a - i, b - j};
+}
+
 }  // namespace
 
 Vec3 DirectionAtlas::direction(int node) const {
@@ -36,11 +49,8 @@ int DirectionAtlas::nearest(const Vec3& d) const {
 SurfacePoint DirectionAtlas::place(const Vec3& d) const {
   const CubePoint c = to_cube(d);
   if (!(c.major > 0)) return where[0];
-  const double half = 0.5 * cells, a = (c.a + 1) * half, b = (c.b + 1) * half;
-  const int i = std::clamp(static_cast<int>(a), 0, cells - 1),
-            j = std::clamp(static_cast<int>(b), 0, cells - 1);
-  const double s = a - i, t = b - j;
-  const SurfacePoint* const p = where.data() + (c.face * (cells + 1) + i) * (cells + 1) + j;
+  const auto [first, s, t] = place_in(c, cells);
+  const SurfacePoint* const p = where.data() + first;
   const SurfacePoint* const q = p + cells + 1;
   const SurfacePoint& nearest = (s < 0.5 ? p : q)[t < 0.5 ? 0 : 1];
   const double weight[4] = {(1 - s) * (1 - t), (1 - s) * t, s * (1 - t), s * t};
@@ -59,8 +69,7 @@ SurfacePoint DirectionAtlas::place(const Vec3& d) const {
 
 void DirectionAtlas::cell(const Vec3& d, int (&nodes)[4]) const {
   const CubePoint c = to_cube(d);
-  const int i = cube_cell(c.a, cells), j = cube_cell(c.b, cells);
-  const int first = (c.face * (cells + 1) + i) * (cells + 1) + j;
+  const int first = place_in(c, cells).first;
   nodes[0] = first;
   nodes[1] = first + 1;
   nodes[2] = first + cells + 1;
@@ -70,12 +79,8 @@ void DirectionAtlas::cell(const Vec3& d, int (&nodes)[4]) const {
 double DirectionAtlas::support_upper(const Vec3& d) const {
   const CubePoint c = to_cube(d);
   if (!(c.major > 0)) return 0;
-  const double half = 0.5 * cells;
-  const double a = (c.a + 1) * half, b = (c.b + 1) * half;
-  const int i = std::clamp(static_cast<int>(a), 0, cells - 1),
-            j = std::clamp(static_cast<int>(b), 0, cells - 1);
-  const double s = a - i, t = b - j;
-  const double* h = support.data() + (c.face * (cells + 1) + i) * (cells + 1) + j;
+  const auto [first, s, t] = place_in(c, cells);
+  const double* h = support.data() + first;
   const double low = h[0] + t * (h[1] - h[0]);
   const double* k = h + cells + 1;
   const double high = k[0] + t * (k[1] - k[0]);

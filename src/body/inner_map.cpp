@@ -30,16 +30,6 @@ float down(double x) {
   return x > 0 ? std::nextafter(static_cast<float>(std::min(x, 1e30)), 0.0f) : 0.0f;
 }
 
-// The largest kink of the joints that a leaf touches.
-double kink_at(const Shape& shape, const Cell& c) {
-  const auto& links = shape.links[c.patch];
-  const bool touches[4] = {c.u0 <= 0, c.u0 + c.du >= 1, c.v0 <= 0, c.v0 + c.dv >= 1};
-  double kink = 0;
-  for (int e = 0; e < 4; ++e)
-    if (touches[e]) kink = std::max({kink, std::abs(links[e].kink), links[e].kink_bound});
-  return kink;
-}
-
 // What no leaf has touched is 0, as what a leaf without normals has.
 float or_none(float x) {
   return x < kLarge ? x : 0;
@@ -59,8 +49,14 @@ bool opens(const Shape& shape) {
 double widest_kink(const Shape& shape) {
   return opens(shape) ? kGapsCrossed * std::max(shape.proofs.opening, shape.proofs.closing) : 0;
 }
-double least_of(const CellBounds& b) {
-  return std::max(b.min_radius, upright_least(b));
+// Whether a leaf touches a joint beside which there may be such normals.
+bool may_fan(const Shape& shape, const Cell& c) {
+  if (!opens(shape)) return false;
+  const auto& links = shape.links[c.patch];
+  const bool touches[4] = {c.u0 <= 0, c.u0 + c.du >= 1, c.v0 <= 0, c.v0 + c.dv >= 1};
+  for (int e = 0; e < 4; ++e)
+    if (touches[e] && links[e].kinked()) return true;
+  return false;
 }
 
 // The radii. Nodes lie in blocks, neighbours mostly: those too far from a leaf are left out as one.
@@ -94,9 +90,8 @@ class NodePainter {
         lower(b.axis, M_PI, 0);
         continue;
       }
-      lower(b.axis, b.cone, down(least_of(b)));
-      if (opens(shape_) && kink_at(shape_, leaf.cell) > kNoKink)
-        lower(b.axis, b.cone + widest_kink(shape_), 0);
+      lower(b.axis, b.cone, down(std::max(b.min_radius, upright_least(b))));
+      if (may_fan(shape_, leaf.cell)) lower(b.axis, b.cone + widest_kink(shape_), 0);
     }
     const double all = shape_.joints.none() ? shape_.patch_curvature.min_radius : 0;
     for (std::size_t i = 0; i < map_.nodes.size(); ++i)
@@ -149,8 +144,7 @@ class StretchPainter {
     for (const Leaf& leaf : leaves) {
       const CellBounds& b = leaf.bounds;
       lower(b, b.cone, b.regular ? down(b.convex ? upright_least(b) : b.min_radius) : 0, true);
-      if (opens(shape_) && b.regular && kink_at(shape_, leaf.cell) > kNoKink)
-        lower(b, b.cone + widest_kink(shape_), 0, false);
+      if (b.regular && may_fan(shape_, leaf.cell)) lower(b, b.cone + widest_kink(shape_), 0, false);
     }
     begin();
     for (const Leaf& leaf : leaves) limit(leaf);

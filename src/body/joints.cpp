@@ -186,6 +186,26 @@ void bound_meeting(const Meeting& m, int depth, double* opening, double* closing
   bound_meeting({std::move(a1), std::move(b1), std::move(t1)}, depth - 1, opening, closing);
 }
 
+// Along a part of an edge: a normal, and the curve's hodograph.
+struct Bending {
+  Vectors normal, hodograph;
+};
+
+void find_rising(const Bending& f, EdgePart range, int depth, std::vector<EdgePart>* parts) {
+  const Scalars bend = multiply(f.normal, derivative(f.hodograph), kDot);
+  const double noise = kBendNoise * kRoundoff * largest(f.normal) * largest(f.hodograph);
+  if (*std::max_element(bend.begin(), bend.end()) <= noise) return;
+  if (depth == 0) {
+    parts->push_back(range);
+    return;
+  }
+  auto [n0, n1] = halve(f.normal);
+  auto [h0, h1] = halve(f.hodograph);
+  const double middle = 0.5 * (range.from + range.to);
+  find_rising({std::move(n0), std::move(h0)}, {range.from, middle}, depth - 1, parts);
+  find_rising({std::move(n1), std::move(h1)}, {middle, range.to}, depth - 1, parts);
+}
+
 }  // namespace
 
 double bound_joint_gap(const BezierPatch& a, int edge, const BezierPatch& b, const EdgeLink& link) {
@@ -229,29 +249,19 @@ KinkBounds bound_kink(const BezierPatch& a, int edge, const BezierPatch& b, cons
   return bounds;
 }
 
-namespace {
-
-// Along a part of an edge: a normal, and the curve's hodograph.
-struct Bending {
-  Vectors normal, hodograph;
-};
-
-void find_rising(const Bending& f, EdgePart range, int depth, std::vector<EdgePart>* parts) {
-  const Scalars bend = multiply(f.normal, derivative(f.hodograph), kDot);
-  const double noise = kBendNoise * kRoundoff * largest(f.normal) * largest(f.hodograph);
-  if (*std::max_element(bend.begin(), bend.end()) <= noise) return;
-  if (depth == 0) {
-    parts->push_back(range);
-    return;
-  }
-  auto [n0, n1] = halve(f.normal);
-  auto [h0, h1] = halve(f.hodograph);
-  const double middle = 0.5 * (range.from + range.to);
-  find_rising({std::move(n0), std::move(h0)}, {range.from, middle}, depth - 1, parts);
-  find_rising({std::move(n1), std::move(h1)}, {middle, range.to}, depth - 1, parts);
+double bound_pole_spread(const BezierPatch& patch, int edge) {
+  const Homogeneous here = row(patch, edge, 0), next = row(patch, edge, 1);
+  const Vec3 pole = here.front().head<3>() / here.front()[3];
+  // Near the pole x = pole + u q / w with q the next row seen from the pole; the normal is q cross q'.
+  Vectors q;
+  for (const Vec4& p : next) q.push_back(p.head<3>() - p[3] * pole);
+  Vectors normal = multiply(q, derivative(q), kCross);
+  const double size = largest(q);
+  if (!(largest(normal) > kVanishing * size * size)) return kInfinity;
+  remove_end_roots(&normal);
+  Vec3 axis;
+  return 2 * half_angle(normal, &axis);
 }
-
-}  // namespace
 
 std::vector<EdgePart> find_dented_parts(const BezierPatch& patch, int edge) {
   // Of even weights at both ends: uneven ones make uneven parts. The curve's derivative is N / w^2 with
@@ -268,20 +278,6 @@ std::vector<EdgePart> find_dented_parts(const BezierPatch& patch, int edge) {
   const auto at = [ratio](double t) { return ratio * t / (1 + (ratio - 1) * t); };
   for (EdgePart& part : parts) part = {at(part.from), at(part.to)};
   return parts;
-}
-
-double bound_pole_spread(const BezierPatch& patch, int edge) {
-  const Homogeneous here = row(patch, edge, 0), next = row(patch, edge, 1);
-  const Vec3 pole = here.front().head<3>() / here.front()[3];
-  // Near the pole x = pole + u q / w with q the next row seen from the pole; the normal is q cross q'.
-  Vectors q;
-  for (const Vec4& p : next) q.push_back(p.head<3>() - p[3] * pole);
-  Vectors normal = multiply(q, derivative(q), kCross);
-  const double size = largest(q);
-  if (!(largest(normal) > kVanishing * size * size)) return kInfinity;
-  remove_end_roots(&normal);
-  Vec3 axis;
-  return 2 * half_angle(normal, &axis);
 }
 
 }  // namespace nurbs

@@ -24,6 +24,10 @@ struct KinkBounds {
 };
 KinkBounds bound_kink(const BezierPatch& a, int edge, const BezierPatch& b, const EdgeLink& link);
 
+// The same for the normals around a pole, which a collapsed edge is: no two of them make a larger angle.
+// Infinite where there is no limit of the normals, as on a flat patch's corner.
+double bound_pole_spread(const BezierPatch& patch, int edge);
+
 // Parts of an edge, ranges of its parameter, in which it may bend up along the outward normal of its patch,
 // which a convex body's do nowhere: there the normals between a sharp edge's sides belong to more points of
 // the body than one. Proven of the others, up to round-off.
@@ -31,9 +35,5 @@ struct EdgePart {
   double from, to;
 };
 std::vector<EdgePart> find_dented_parts(const BezierPatch& patch, int edge);
-
-// The same for the normals around a pole, which a collapsed edge is: no two of them make a larger angle.
-// Infinite where there is no limit of the normals, as on a flat patch's corner.
-double bound_pole_spread(const BezierPatch& patch, int edge);
 
 }  // namespace nurbs

@@ -98,19 +98,24 @@ class Painter {
     return bound_kink(shape_.patches[patch], edge, shape_.patches[link.patch], link).closing > kNoKink;
   }
 
+  // The normals of a joint's two sides at its parameter t, the same twice where there is one.
+  struct Sides {
+    Vec3 here, there;
+  };
+  Sides sides(int patch, int edge, double t) const {
+    const EdgeLink& link = shape_.links[patch][edge];
+    const Vec2 at = edge_parameters(edge, t);
+    const Vec3 here = local_form(shape_.patches[patch], at[0], at[1]).normal;
+    if (link.patch < 0) return {here, here};
+    const SurfacePoint other = across(shape_.patches, link, {patch, at[0], at[1]}, edge);
+    return {here, local_form(shape_.patches[link.patch], other.u, other.v).normal};
+  }
+
   // The normals of both sides and those between.
   void paint_joint(int patch, int edge) {
-    const EdgeLink& link = shape_.links[patch][edge];
     Vec3 before;
     for (int k = 0; k <= kNormalJointSamples; ++k) {
-      const double t = static_cast<double>(k) / kNormalJointSamples;
-      const Vec2 at = edge_parameters(edge, t);
-      const Vec3 here = local_form(shape_.patches[patch], at[0], at[1]).normal;
-      Vec3 there = here;
-      if (link.patch >= 0) {
-        const SurfacePoint other = across(shape_.patches, link, {patch, at[0], at[1]}, edge);
-        there = local_form(shape_.patches[link.patch], other.u, other.v).normal;
-      }
+      const auto [here, there] = sides(patch, edge, static_cast<double>(k) / kNormalJointSamples);
       const Vec3 middle = (here + there).normalized();
       const double step = k > 0 ? angle_between(before, middle) : 0;
       const double half = kJointCapSafety * angle_between(middle, here);
@@ -121,22 +126,19 @@ class Painter {
 
   // The normals between both sides of a part of a joint, sampled at its ends and middle.
   void paint_fan(int patch, int edge, const EdgePart& part) {
-    const EdgeLink& link = shape_.links[patch][edge];
-    Vec3 here[3], there[3];
-    for (int k = 0; k < 3; ++k) {
-      const Vec2 at = edge_parameters(edge, part.from + 0.5 * k * (part.to - part.from));
-      const SurfacePoint other = across(shape_.patches, link, {patch, at[0], at[1]}, edge);
-      here[k] = local_form(shape_.patches[patch], at[0], at[1]).normal;
-      there[k] = local_form(shape_.patches[link.patch], other.u, other.v).normal;
+    const double half = 0.5 * (part.to - part.from);
+    const Sides middle = sides(patch, edge, part.from + half);
+    double along = 0;
+    for (const double t : {part.from, part.from + 2 * half}) {
+      const Sides end = sides(patch, edge, t);
+      along = std::max({along, angle_between(end.here, middle.here), angle_between(end.there, middle.there)});
     }
-    const double along = std::max({angle_between(here[0], here[1]), angle_between(here[1], here[2]),
-                                   angle_between(there[0], there[1]), angle_between(there[1], there[2])});
-    const double width = angle_between(here[1], there[1]);
+    const double width = angle_between(middle.here, middle.there);
     const int caps = 1 + static_cast<int>(width / kFanStep);
     for (int k = 0; k <= caps; ++k) {
       const double t = width * k / caps;
-      const Vec3 between = std::sin(width - t) * here[1] + std::sin(t) * there[1],
-                 n = width > kNoKink ? Vec3(between.normalized()) : here[1];
+      const Vec3 between = std::sin(width - t) * middle.here + std::sin(t) * middle.there,
+                 n = width > kNoKink ? Vec3(between.normalized()) : middle.here;
       wide_.paint(n, width / caps + kJointCapSafety * along + kNormalMargin, kInfinity, map_);
     }
   }

@@ -51,6 +51,8 @@ struct BallHull {
   std::vector<Vec3> centres;  // none: the body is no such one, or isn't known to be
   std::vector<double> radii;
   double error = 0;
+
+  bool found() const { return !centres.empty(); }
 };
 template <class Archive>
 void archive(Archive& a, BallHull& s) {

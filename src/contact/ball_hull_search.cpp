@@ -14,7 +14,7 @@ constexpr double kSameLine = 1e-15;  // sine between differences of centres: cir
 constexpr double kTouching = 1e-13;  // of a length of 1: circles that touch
 
 struct Balls {
-  int count = 0;
+  int count = 0;            // none: not a hull of balls, or of too many
   Vec3 centre[kMostBalls];  // pair frame
   double radius[kMostBalls];
   double error = 0;
@@ -60,20 +60,20 @@ class BallHullSearch {
     return off_ < kFarAway;
   }
 
-  void fill(PolytopeResult* r) const {
+  void fill(const PairFrame& pair, PolytopeResult* r) const {
     r->bracket.direction = direction_;
     r->bracket.lower = -there_ - noise_;
     r->bracket.upper = -least_ + noise_;
     r->gap = -there_;
-    r->points.na = direction_;
-    r->points.nb = -direction_;
-    r->points.a = r->points.b = Vec3::Zero();
+    r->converged = r->closed = true;
+    r->iterations = 1;
+    Vec3 a = Vec3::Zero(), b = Vec3::Zero();
     for (int n = 0; n < 3; ++n) {
       const int i = active_[n] / b_.count, j = active_[n] % b_.count;
-      r->points.a += weights_[n] * (a_.centre[i] + a_.radius[i] * direction_);
-      r->points.b += weights_[n] * (b_.centre[j] - b_.radius[j] * direction_);
+      a += weights_[n] * (a_.centre[i] + a_.radius[i] * direction_);
+      b += weights_[n] * (b_.centre[j] - b_.radius[j] * direction_);
     }
-    part_points(r);
+    set_points(pair, a, b, r);
   }
   double width() const { return 4 * noise_; }  // at most
 
@@ -176,20 +176,14 @@ class BallHullSearch {
 }  // namespace
 
 bool search_ball_hulls(const PairFrame& pair, double tolerance, PolytopeResult* result) {
-  const auto is_hull = [](const Shape& s) { return !s.ball_hull.centres.empty(); };
-  if (!is_hull(*pair.a) && !is_hull(*pair.b)) return false;  // of points and a ball the polytope is
-  const auto is_one = [&](const Shape& s) { return s.core.found() || is_hull(s); };
-  if (!is_one(*pair.a) || !is_one(*pair.b)) return false;
+  // Of points and a ball the polytope is.
+  if (!pair.a->ball_hull.found() && !pair.b->ball_hull.found()) return false;
   const Balls a(*pair.a, pair.scale_a, Mat3::Identity(), Vec3::Zero()),
       b(*pair.b, pair.scale_b, pair.turn, pair.offset);
   if (a.count == 0 || b.count == 0) return false;
   BallHullSearch search(pair, a, b);
   if (!(search.width() <= 0.5 * tolerance) || !search.run()) return false;
-  search.fill(result);
-  result->converged = result->closed = true;
-  result->iterations = 1;
-  result->points.on_a = find_feature_support(*pair.a, result->points.na).where;
-  result->points.on_b = find_feature_support(*pair.b, pair.direction_on_b(result->points.na)).where;
+  search.fill(pair, result);
   return true;
 }
 

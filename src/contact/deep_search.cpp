@@ -210,8 +210,8 @@ class DeepSearch {
     return corners.above(g, r.level + noise_);
   }
 
-  // Newton from the atlases' points nearest to a direction (of any length). False where the search can't go
-  // on.
+  // Newton from where the atlases have the supports along a direction (of any length). False where the search
+  // can't go on.
   bool look(const Vec3& d) {
     if (newtons_ == kMostNewtons) return false;
     looked_[newtons_++] = d.normalized();
@@ -281,9 +281,14 @@ class DeepSearch {
     const Vec3& d = s.bracket.direction;
     const Vec3 g = s.jet_a.at(JetLanes::kS) - s.jet_b.at(JetLanes::kS), on_b = pair_.direction_on_b(d);
     const InnerNode &na = nearest(inner_a_, d), &nb = nearest(inner_b_, on_b);
-    const Stretches near = stretches(d, on_b);
+    const int cell_a = InnerMap::cell(d), cell_b = InnerMap::cell(on_b);
+    const InnerStretch &sa = inner_a_.stretches[cell_a], &sb = inner_b_.stretches[cell_b];
+    const auto off = [&](const Vec3& middle_a, const Vec3& middle_b) {
+      return std::acos(std::min(1.0, std::min(d.dot(middle_a), on_b.dot(middle_b)))) + kCapRoundoff;
+    };
+    const double off_node = off(na.normal, nb.normal),
+                 off_stretch = off(InnerMap::middle(cell_a), InnerMap::middle(cell_b));
     const Vec3 t = d.unitOrthogonal(), u = d.cross(t);
-    const double off_node = off(d, on_b, na.normal, nb.normal), off_stretch = near.off;
     const LocalBend local = bend_at(s, t, u);
     const double y0 = d.dot(g), angle = std::sqrt(s.bracket.angle2) + kPoleNormal;
     double falls = (g - y0 * d).norm();
@@ -300,7 +305,7 @@ class DeepSearch {
         while (k < kStretches && kStretchCaps[k] - off_stretch < to) ++k;
         while (r < kCaps && kInnerCaps[r] - off_node < to) ++r;
         double m = 0;
-        if (k < kStretches) m = extremes(stretched(d, t, u, to, k, near)).least;
+        if (k < kStretches) m = stretched(d, to, k, sa, sb);
         if (r < kCaps) m = std::max(m, pair_.scale_a * na.radius[r] + pair_.scale_b * nb.radius[r]);
         // y'' + y = m. Falling, it has its least value where it turns; rising at first, at an end.
         const double above = at.y - m, slope = at.slope;
@@ -358,26 +363,9 @@ class DeepSearch {
     return {a.turn + b.turn, a.rate + b.rate, std::min({a.reach, b.reach, kWidestNearby})};
   }
 
-  // The stretches of a direction, and how far from their middles it is, rad.
-  struct Stretches {
-    const InnerStretch &a, &b;
-    double off;
-  };
-  Stretches stretches(const Vec3& d, const Vec3& on_b) const {
-    const int cell_a = InnerMap::cell(d), cell_b = InnerMap::cell(on_b);
-    return {inner_a_.stretches[cell_a], inner_b_.stretches[cell_b],
-            off(d, on_b, InnerMap::middle(cell_a), InnerMap::middle(cell_b))};
-  }
-  static double off(const Vec3& d, const Vec3& on_b, const Vec3& near_d, const Vec3& near_on_b) {
-    return std::acos(std::min(1.0, std::min(d.dot(near_d), on_b.dot(near_on_b)))) + kCapRoundoff;
-  }
-
-  // A lower bound, as a form in the plane of t and u, square to d, of W_A + W_B along great circles from d as
-  // far as `angle`. v = cos e x - sin e d goes on with the great circle that leaves d along x, so |f . v| >=
-  // cos e |f . x| - sin e |f . d|.
-  Mat2 stretched(const Vec3& d, const Vec3& t, const Vec3& u, double angle, int k,
-                 const Stretches& near) const {
-    const InnerStretch &a = near.a, &b = near.b;
+  // Least eigenvalue of W_A + W_B within `angle` of d. For a unit v square to a direction there, v = cos e u
+  // + sin e d with u square to d and |e| <= angle, so |f . v| >= cos(angle) |f . u| - sin(angle) |f . d|.
+  double stretched(const Vec3& d, double angle, int k, const InnerStretch& a, const InnerStretch& b) const {
     const Vec3 fa(a.along[0], a.along[1], a.along[2]);
     const Vec3 fb = pair_.turn * Vec3(b.along[0], b.along[1], b.along[2]);
     const double c2 = std::cos(angle) * std::cos(angle), s2 = 1 - c2;
@@ -385,9 +373,10 @@ class DeepSearch {
     const double ta = d.dot(fa), tb = d.dot(fb);
     const double lost = (1 / kSlack - 1) * s2 * (most_a * ta * ta + most_b * tb * tb);
     const double wa = (1 - kSlack) * c2 * most_a, wb = (1 - kSlack) * c2 * most_b;
-    const Vec2 xa(t.dot(fa), u.dot(fa)), xb(t.dot(fb), u.dot(fb));
-    return (pair_.scale_a * a.least[k] + pair_.scale_b * b.least[k] - lost) * Mat2::Identity() +
-           wa * xa * xa.transpose() + wb * xb * xb.transpose();
+    const double half = 0.5 * (wa * (fa.squaredNorm() - ta * ta) + wb * (fb.squaredNorm() - tb * tb));
+    const double across = d.dot(fa.cross(fb)), det = wa * wb * across * across;
+    const double least = half - std::sqrt(std::max(0.0, half * half - det));
+    return pair_.scale_a * a.least[k] + pair_.scale_b * b.least[k] + least - lost;
   }
 
   // The coarse cells; the lowest of those that stay is looked into first.

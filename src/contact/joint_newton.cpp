@@ -181,11 +181,16 @@ bool close_enough(const Bracket& bracket, double tolerance, double size) {
   return bracket.width() <= tolerance && bracket.angle2 * size <= std::max(tolerance, kRoundoff * size);
 }
 
+// What local maxima of both bodies may lack of their supports.
+double hidden_by_dents(const PairFrame& pair) {
+  return pair.scale_a * pair.a->support_excess + pair.scale_b * pair.b->support_excess;
+}
+
 // Next to a dent, whose allowance keeps the bracket open: the points after the step would close it but for
 // that, so that only the supports along their normal are left to confirm. Else the points stay.
 NURBS_INLINE bool settles(const PairFrame& pair, JointSolution& s, const Forms& a, const Forms& b,
                           const Steps& steps, double tolerance) {
-  const double excess = pair.scale_a * pair.a->support_excess + pair.scale_b * pair.b->support_excess;
+  const double excess = hidden_by_dents(pair);
   if (!s.dented || !dents_count(excess, tolerance) || !(s.bracket.angle2 * pair.size <= tolerance))
     return false;
   const PointPair before = s.points;
@@ -288,7 +293,7 @@ void confirm_lower(const PairFrame& pair, double tolerance, JointSolution* s) {
 }
 
 bool confirm_joint(const PairFrame& pair, double tolerance, JointSolution* s) {
-  const double excess = pair.scale_a * pair.a->support_excess + pair.scale_b * pair.b->support_excess;
+  const double excess = hidden_by_dents(pair);
   if (!s->stationary || !dents_count(excess, tolerance) || s->bracket.width() > 2 * excess + tolerance)
     return false;
   confirm_lower(pair, tolerance, s);

@@ -44,10 +44,5 @@ JointSolution solve_joint(const PairFrame& pair, const SurfacePoint& on_a, const
 void confirm_lower(const PairFrame& pair, double tolerance, JointSolution* s);
 // The same where it may close the bracket: whether it does.
 bool confirm_joint(const PairFrame& pair, double tolerance, JointSolution* s);
-// Whether dents of the bodies keep brackets open that the certificate makes.
-inline bool dents_count(const PairFrame& pair, double tolerance) {
-  return dents_count(pair.scale_a * pair.a->support_excess + pair.scale_b * pair.b->support_excess,
-                     tolerance);
-}
 
 }  // namespace nurbs

@@ -24,6 +24,18 @@ inline void part_points(PolytopeResult* r) {
   r->points.b += shift;
 }
 
+// Contact points along the bracket's direction that a closed form has found, the gap apart, and where the
+// surfaces' searches begin the next time.
+inline void set_points(const PairFrame& pair, const Vec3& a, const Vec3& b, PolytopeResult* r) {
+  r->points.na = r->bracket.direction;
+  r->points.nb = -r->points.na;
+  r->points.a = a;
+  r->points.b = b;
+  part_points(r);
+  r->points.on_a = find_feature_support(*pair.a, r->points.na).where;
+  r->points.on_b = find_feature_support(*pair.b, pair.direction_on_b(r->points.na)).where;
+}
+
 // Grows a polytope inside the configuration space obstacle A - B (shrunk by a share of the bodies' least
 // curvature radii, which are added back) from exact support points. While the origin is outside, the next
 // direction is that of the polytope's nearest point, as in GJK, and |nearest point| bounds the gap above;

@@ -30,17 +30,6 @@ Segment segment_of(const SpheroPolyhedron& core, double scale, const Mat3& turn,
   return {0.5 * (p + q), 0.5 * (p - q)};
 }
 
-// Contact points along the bracket's direction, and where the surfaces' searches begin the next time.
-void set_points(const PairFrame& pair, const Vec3& a, const Vec3& b, PolytopeResult* r) {
-  r->points.na = r->bracket.direction;
-  r->points.nb = -r->points.na;
-  r->points.a = a;
-  r->points.b = b;
-  part_points(r);
-  r->points.on_a = find_feature_support(*pair.a, r->points.na).where;
-  r->points.on_b = find_feature_support(*pair.b, pair.direction_on_b(r->points.na)).where;
-}
-
 }  // namespace
 
 bool search_segments(const PairFrame& pair, double tolerance, PolytopeResult* result) {

@@ -189,6 +189,29 @@ TEST(InnerMap, is_used_where_it_is_there_and_not_made_by_pairs_that_do_without) 
   EXPECT_GT(by_maps, 50);
 }
 
+// That a proven minimum is one: its normal has it, and of so many directions anywhere and beside it none
+// overlaps by less.
+void expect_minimum(const Pair& p, const PairFrame& pair, const JointSolution& s, double tolerance,
+                    int anywhere, int beside, Random& random) {
+  const auto overlap = [&](const Vec3& d) { return overlap_along(p.a, p.b, pair.axes_a * d); };
+  const double least = -s.bracket.upper, noise = 1e-14 * pair.reach;
+  ASSERT_TRUE(s.converged);
+  EXPECT_LE(s.bracket.width(), tolerance);
+  EXPECT_NEAR(overlap(s.normal), -s.gap, tolerance + noise);
+  for (int i = 0; i < anywhere; ++i) ASSERT_GE(overlap(random.direction()), least - noise);
+  for (int i = 0; i < beside; ++i)
+    ASSERT_GE(overlap(near(s.normal, random.log_uniform(1e-6, 0.3), random)), least - noise);
+}
+
+// Whether the search proves one from nothing; then it is.
+bool prove(const Pair& p, const PairFrame& pair, int anywhere, int beside, Random& random, JointSolution* s) {
+  const double tolerance = 1e-9 * pair.size;
+  s->iterations = 0;
+  if (!search_deep(pair, tolerance, s)) return false;
+  expect_minimum(p, pair, *s, tolerance, anywhere, beside, random);
+  return true;
+}
+
 TEST(DeepSearch, no_direction_overlaps_by_less_than_is_proven) {
   Random random(73);
   const ShapePointer shapes[] = {ellipsoid(), disc(), slender(), smooth_pebble(), polar(), needle()};
@@ -196,22 +219,15 @@ TEST(DeepSearch, no_direction_overlaps_by_less_than_is_proven) {
   for (int k = 0; k < 600; ++k) {
     const Pair p = deep_pair(*shapes[random.below(6)], *shapes[random.below(6)], random);
     const PairFrame pair = mapped(p);
-    const double tolerance = 1e-9 * pair.size;
+    SCOPED_TRACE(k);
     JointSolution s;
-    s.iterations = 0;
     ++tried;
-    if (!search_deep(pair, tolerance, &s)) continue;
+    if (!prove(p, pair, 400, 100, random, &s)) continue;
     ++proven;
-    ASSERT_TRUE(s.converged);
-    EXPECT_LE(s.bracket.width(), tolerance);
-    const auto overlap = [&](const Vec3& d) { return overlap_along(p.a, p.b, pair.axes_a * d); };
-    const double least = -s.bracket.upper, noise = 1e-14 * pair.reach;
-    EXPECT_NEAR(overlap(s.normal), -s.gap, tolerance + noise);
-    for (int i = 0; i < 400; ++i) ASSERT_GE(overlap(random.direction()), least - noise) << k;
-    for (int i = 0; i < 100; ++i)
-      ASSERT_GE(overlap(near(s.normal, random.log_uniform(1e-6, 0.3), random)), least - noise) << k;
+    if (HasFatalFailure()) return;
     if (k % 4) continue;
-    const PolytopeResult hull = solve_polytope(pair, s.normal, tolerance, kFarAway);
+    const double noise = 1e-14 * pair.reach;
+    const PolytopeResult hull = solve_polytope(pair, s.normal, 1e-9 * pair.size, kFarAway);
     EXPECT_LE(s.bracket.lower, hull.bracket.upper + noise) << k;
     EXPECT_GE(s.bracket.upper, hull.bracket.lower - noise) << k;
   }
@@ -233,16 +249,10 @@ TEST(DeepSearch, proves_minima_of_pebbles) {
     p.b.q = random.turn();
     p.b.x = random.uniform(0, 0.4) * shape.inner_radius * random.direction();
     const PairFrame pair = mapped(p);
-    const double tolerance = 1e-9 * pair.size;
+    SCOPED_TRACE(k);
     JointSolution s;
-    s.iterations = 0;
-    if (!search_deep(pair, tolerance, &s)) continue;
-    ++proven;
-    const auto overlap = [&](const Vec3& d) { return overlap_along(p.a, p.b, pair.axes_a * d); };
-    const double least = -s.bracket.upper, noise = 1e-14 * pair.reach;
-    for (int i = 0; i < 100; ++i) ASSERT_GE(overlap(random.direction()), least - noise) << k;
-    for (int i = 0; i < 100; ++i)
-      ASSERT_GE(overlap(near(s.normal, random.log_uniform(1e-6, 0.3), random)), least - noise) << k;
+    proven += prove(p, pair, 100, 100, random, &s);
+    if (HasFatalFailure()) return;
   }
   EXPECT_GT(proven, 340);
 }
@@ -263,19 +273,11 @@ TEST(DeepSearch, proves_minima_of_dented_bodies) {
     p.b.q = random.turn();
     p.b.x = random.uniform(0, 0.8) * p.a.shape->inner_radius * random.direction();
     const PairFrame pair = mapped(p);
-    const double tolerance = 1e-9 * pair.size;
+    SCOPED_TRACE(k);
     JointSolution s;
-    s.iterations = 0;
     ++tried;
-    if (!search_deep(pair, tolerance, &s)) continue;
-    ++proven;
-    ASSERT_TRUE(s.converged);
-    const auto overlap = [&](const Vec3& d) { return overlap_along(p.a, p.b, pair.axes_a * d); };
-    const double least = -s.bracket.upper, noise = 1e-14 * pair.reach;
-    EXPECT_NEAR(overlap(s.normal), -s.gap, tolerance + noise) << k;
-    for (int i = 0; i < 300; ++i) ASSERT_GE(overlap(random.direction()), least - noise) << k;
-    for (int i = 0; i < 300; ++i)
-      ASSERT_GE(overlap(near(s.normal, random.log_uniform(1e-6, 0.3), random)), least - noise) << k;
+    proven += prove(p, pair, 300, 300, random, &s);
+    if (HasFatalFailure()) return;
   }
   EXPECT_GT(proven, tried / 5);
 }
