@@ -8,6 +8,7 @@
 #include "body/cube_map.h"
 #include "contact/direction_search.h"
 #include "contact/local_bend.h"
+#include "contact/widen_cap.h"
 #include "nurbs/wide.h"
 
 namespace nurbs {
@@ -18,12 +19,17 @@ constexpr int kNewtonDepth = 5;  // at which a cell that stays is looked into, a
 constexpr int kDeepest = 9;
 constexpr int kSupportDepth = 6;  // from which supports are evaluated
 constexpr int kMostSupports = 28;
+constexpr int kBeforeWidening = 4;  // supports before a cap is widened, and between that and the next
+constexpr int kMostWidening = 100;  // points spent on that
 constexpr int kMostCells = 800;
 constexpr int kMostNewtons = 12;
 constexpr int kMostCaps = 8;
 constexpr int kStretches = static_cast<int>(kStretchCaps.size()), kCaps = static_cast<int>(kInnerCaps.size());
 constexpr double kLeastCap = 0.012;  // rad: about the best minimum; less would leave thousands of cells
-constexpr double kSameLook = 0.993;  // cosine between directions that searches begin in
+constexpr std::array<double, 2> kWidened = {0.21, 0.42};  // rad, that caps are widened to in turn
+constexpr double kAsLarge = 0.8;                          // times balls that hold less far, others serve too
+constexpr double kSameBasin = 0.95;                       // cosine between a cell and a minimum of its own
+constexpr double kSameLook = 0.993;                       // cosine between directions that searches begin in
 constexpr double kWidestNearby = 0.4, kLeastNearby = 1e-4, kNextNearby = 0.8;  // rad: caps by W alone
 constexpr double kFurthest = 0.5;        // rad, that points alone may reach ...
 constexpr double kFurtherShare = 0.8;    // ... and of what they prove, so that something is left at the end
@@ -48,6 +54,9 @@ constexpr double kKeptRise = 0.25;   // ... of p's rise over the cap, which cell
 struct Cap {
   Vec3 d;
   double cosine;
+  SurfacePoint on_a, on_b;  // of the minimum ...
+  Mat2 turn;                // ... and W_A + W_B there, along d.unitOrthogonal() and square to it
+  std::size_t widened;      // how often that was tried; kWidened.size(): no more
 };
 
 struct Grown {
@@ -134,7 +143,7 @@ class DeepSearch {
     threshold_ = least;
     const Vec3 before(proof.direction[0], proof.direction[1], proof.direction[2]);
     const double turned = angle_between(best_.bracket.direction, before) + kCapRoundoff;
-    if (!(cap_about(best_).angle >= proof.angle + turned)) return false;
+    if (!(cap_about(best_, bend_at(best_)).angle >= proof.angle + turned)) return false;
     finish(s);
     return s->converged;
   }
@@ -216,10 +225,24 @@ class DeepSearch {
     if (newtons_ == kMostNewtons) return false;
     looked_[newtons_++] = d.normalized();
     const Shape &a = *pair_.a, &b = *pair_.b;
-    const JointSolution s = solve_joint(pair_, a.atlas.place(d), b.atlas.place(pair_.direction_on_b(d)),
-                                        tolerance_, kFarAway, kPolishIterations);
+    return go_from(a.atlas.place(d), b.atlas.place(pair_.direction_on_b(d)));
+  }
+
+  bool go_from(const SurfacePoint& on_a, const SurfacePoint& on_b) {
+    const JointSolution s = solve_joint(pair_, on_a, on_b, tolerance_, kFarAway, kPolishIterations);
     iterations_ += s.iterations;
     return !(s.stationary || s.converged) || consider(confirmed(s));
+  }
+
+  // From a cell's middle. Newton may go uphill, to a maximum or a saddle: then from the supports along the
+  // lowest direction that the atlases see downhill.
+  bool look_around(const Vec3& d) {
+    const int caps = caps_;
+    if (!look(d)) return false;
+    if (caps_ > caps && cap_[caps].d.dot(d) > kSameBasin) return true;
+    const Vec3 lower = refine_guess(pair_, {d, atlas_overlap(pair_, d)}).d;
+    const auto [a, b] = hull_supports(pair_, lower, nullptr, nullptr, tolerance_);
+    return go_from(a.where, b.where);
   }
 
   // With the hulls' supports along its normal where dents may hide others, at points right to round-off.
@@ -247,22 +270,66 @@ class DeepSearch {
     const Vec3& d = s.bracket.direction;
     for (int k = 0; k < caps_; ++k)
       if (d.dot(cap_[k].d) > 1 - 0.5 * kLeastCap * kLeastCap) return true;
-    Grown cap = cap_about(s);
+    const LocalBend local = bend_at(s);
+    Cap cap{d, 1, s.base_a, s.base_b, local.turn, local.reach > 0 ? 0 : kWidened.size()};
+    Grown grown = cap_about(s, local);
+    if (grown.angle < kLeastCap)
+      grown = {widened(cap, std::max(grown.angle, held(s)), kWidened[0], lowest ? threshold_ : level()), 0};
     if (lowest) {
-      closed_ = cap.angle >= kLeastCap;
+      closed_ = grown.angle >= kLeastCap;
       best_cap_ = caps_;
-      kept_ = cap;
-      if (keep_ && kKeptAngle * cap.angle >= kLeastCap) {
-        margin_ = std::min(rival - threshold_, kKeptRise * cap.rise);
-        cap.angle *= kKeptAngle;
+      kept_ = grown;
+      if (keep_ && grown.rise > 0 && kKeptAngle * grown.angle >= kLeastCap) {
+        margin_ = std::min(rival - threshold_, kKeptRise * grown.rise);
+        grown.angle *= kKeptAngle;
         whole_ = kept_.angle;
-        kept_ = cap;
+        kept_ = grown;
       }
     }
-    if (cap.angle < kLeastCap) return !lowest;
+    if (grown.angle < kLeastCap) return !lowest;
     if (caps_ == kMostCaps) return false;
-    cap_[caps_++] = {d, std::cos(cap.angle)};
+    cap.cosine = std::cos(grown.angle);
+    cap_[caps_++] = cap;
     return true;
+  }
+
+  // How far a minimum's points overlap by what p has to be.
+  double held(const JointSolution& s) const {
+    const Vec3 &d = s.bracket.direction, g = s.jet_a.at(JetLanes::kS) - s.jet_b.at(JetLanes::kS);
+    const double y = d.dot(g), room = y - threshold_ - margin_ - noise_, falls = (g - y * d).norm() + noise_;
+    return room > 0 ? 2 * room / (falls + std::sqrt(falls * falls + 2 * y * room)) : 0;
+  }
+
+  // A cap widened by points from `proven` on, with the balls of the inner maps as far as they hold.
+  double widened(const Cap& cap, double proven, double wanted, double level) {
+    if (!(proven > 0) || cap.widened == kWidened.size()) return proven;
+    const Vec3 &d = cap.d, t = d.unitOrthogonal(), on_b = pair_.direction_on_b(d);
+    const CappedMinimum minimum{d, t, d.cross(t), cap.on_a, cap.on_b, cap.turn, level, tolerance_};
+    const InnerNode &a = nearest(inner_a_, d), &b = nearest(inner_b_, on_b);
+    const double off = std::max(angle_between(d, a.normal), angle_between(on_b, b.normal)) + kCapRoundoff;
+    for (int k = 0; k < kCaps; ++k) {
+      const CapBalls balls{pair_.scale_a * a.radius[k], pair_.scale_b * b.radius[k], kInnerCaps[k] - off};
+      const double next =
+          k + 1 < kCaps ? pair_.scale_a * a.radius[k + 1] + pair_.scale_b * b.radius[k + 1] : 0;
+      if (balls.valid < wanted && next > kAsLarge * (balls.radius_a + balls.radius_b)) continue;
+      proven = widen_cap(pair_, minimum, balls, proven, wanted, kMostWidening, &widening_);
+    }
+    return widen_cap(pair_, minimum, {}, proven, wanted, kMostWidening, &widening_);
+  }
+
+  // The cap nearest to a direction; whether it is wider now.
+  bool widen_nearest(const Vec3& d) {
+    Cap* near = std::max_element(cap_, cap_ + caps_,
+                                 [&](const Cap& a, const Cap& b) { return d.dot(a.d) < d.dot(b.d); });
+    const double angle = std::acos(near->cosine);
+    while (near->widened < kWidened.size()) {
+      const double wider = widened(*near, angle, kWidened[near->widened], level());
+      ++near->widened;
+      if (!(wider > angle)) continue;
+      near->cosine = std::cos(wider);
+      return true;
+    }
+    return false;
   }
 
   // Goes on without a margin for the steps to come; false where there was none.
@@ -275,7 +342,7 @@ class DeepSearch {
 
   // How far from a stationary direction p is proven to be at least what it has to be, the threshold about the
   // least minimum.
-  Grown cap_about(const JointSolution& s) const {
+  Grown cap_about(const JointSolution& s, const LocalBend& local) const {
     const double level =
         -s.bracket.lower - kFromThreshold * tolerance_ > threshold_ ? this->level() : threshold_;
     const Vec3& d = s.bracket.direction;
@@ -288,8 +355,6 @@ class DeepSearch {
     };
     const double off_node = off(na.normal, nb.normal),
                  off_stretch = off(InnerMap::middle(cell_a), InnerMap::middle(cell_b));
-    const Vec3 t = d.unitOrthogonal(), u = d.cross(t);
-    const LocalBend local = bend_at(s, t, u);
     const double y0 = d.dot(g), angle = std::sqrt(s.bracket.angle2) + kPoleNormal;
     double falls = (g - y0 * d).norm();
     falls +=
@@ -355,9 +420,9 @@ class DeepSearch {
     return {0, 0, 0};
   }
 
-  // Of both bodies together.
-  LocalBend bend_at(const JointSolution& s, const Vec3& t, const Vec3& u) const {
-    const Vec3& d = s.bracket.direction;
+  // Of both bodies together, along d.unitOrthogonal() and square to it.
+  LocalBend bend_at(const JointSolution& s) const {
+    const Vec3 &d = s.bracket.direction, t = d.unitOrthogonal(), u = d.cross(t);
     const LocalBend a = local_bend(*pair_.a, pair_.scale_a, s.base_a, s.jet_a, d, t, u),
                     b = local_bend(*pair_.b, pair_.scale_b, s.base_b, s.jet_b, -d, t, u);
     return {a.turn + b.turn, a.rate + b.rate, std::min({a.reach, b.reach, kWidestNearby})};
@@ -404,7 +469,7 @@ class DeepSearch {
   void leave_saddle() {
     const Vec3 d = best_.bracket.direction;
     const Vec3 t = d.unitOrthogonal(), u = d.cross(t);
-    const LocalBend local = bend_at(best_, t, u);
+    const LocalBend local = bend_at(best_);
     const double least = extremes(local.turn).least, p = threshold_;
     if (!(local.reach > 0 && least < p)) return;
     const Vec2 axis = least_axis(local.turn, least);
@@ -418,13 +483,19 @@ class DeepSearch {
       const DirectionCell cell = cell_[--count_];
       const Corners corners(cell);
       if (excluded(cell, corners)) continue;
-      if (cell.depth() >= kNewtonDepth && (cell.depth() - kNewtonDepth) % 2 == 0 && is_new(corners)) {
+      if (cell.depth() >= kNewtonDepth && (cell.depth() - kNewtonDepth) % 2 == 0 && is_new(cell, corners)) {
         const int caps = caps_;
         const double threshold = threshold_;
-        if (!look(corners.middle())) return false;
+        if (!look_around(corners.middle().normalized())) return false;
         if ((caps_ > caps || threshold_ < threshold) && excluded(cell, corners)) continue;
       }
-      if (cell.depth() >= kSupportDepth && excluded_by_supports(cell, corners)) continue;
+      if (cell.depth() >= kSupportDepth) {
+        if (supports_ >= next_widening_) {
+          next_widening_ = supports_ + kBeforeWidening;
+          if (widen_nearest(corners.middle().normalized()) && excluded(cell, corners)) continue;
+        }
+        if (excluded_by_supports(cell, corners)) continue;
+      }
       if (cell.depth() == kDeepest) {
         if (give_up_margin() && excluded(cell, corners)) continue;
         return false;
@@ -438,10 +509,10 @@ class DeepSearch {
     return true;
   }
 
-  // Twice as far from every minimum as its cap reaches, and where no search has begun.
-  bool is_new(const Corners& corners) const {
+  // Where no search has begun; of large cells those twice as far from every minimum as its cap reaches.
+  bool is_new(const DirectionCell& cell, const Corners& corners) const {
     const Vec3 d = corners.middle().normalized();
-    for (int k = 0; k < caps_; ++k)
+    for (int k = 0; k < caps_ && cell.depth() == kNewtonDepth; ++k)
       if (1 - d.dot(cap_[k].d) < 4 * (1 - cap_[k].cosine)) return false;
     for (int k = 0; k < newtons_; ++k)
       if (d.dot(looked_[k]) > kSameLook) return false;
@@ -469,7 +540,8 @@ class DeepSearch {
   double whole_ = 0;  // its angle before it was cut for the steps to come
   Grown kept_{0, 0};
   JointSolution best_;
-  int caps_ = 0, count_ = 0, cells_ = 0, newtons_ = 0, supports_ = 0, iterations_ = 0;
+  int caps_ = 0, count_ = 0, cells_ = 0, newtons_ = 0, supports_ = 0, next_widening_ = kBeforeWidening,
+      widening_ = 0, iterations_ = 0;
   Cap cap_[kMostCaps];
   Vec3 looked_[kMostNewtons];  // where searches began
   DirectionCell cell_[6 * (1 << kFirstDepth) * (1 << kFirstDepth) + 4 * kDeepest];
