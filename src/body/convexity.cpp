@@ -15,6 +15,7 @@
 namespace nurbs {
 namespace {
 
+constexpr double kLeastDepth = 0.25;  // of the excess: a shallow dent's is about that at least
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 // Every k-th sample so that at most `most` remain.
@@ -234,6 +235,25 @@ double worst_of(const Measure& measure, const std::vector<SurfacePoint>& places,
   return climb(measure, where, step);
 }
 
+// A sample of every patch that bends inward by more than its own round-off, if by less than what is noise
+// elsewhere: twisted walls between curves that are nearly alike.
+std::vector<SurfacePoint> places_hardly_hollow(const std::vector<SurfaceSample>& samples, double size) {
+  std::vector<SurfacePoint> places;
+  double most = 0;
+  for (const SurfaceSample& s : samples) {
+    const double hollow = -s.k_min - std::max(s.noise, kHollowNoise / size);
+    if (!(hollow > 0 && s.k_min >= -kCurvatureNoise / size)) continue;
+    const bool same = !places.empty() && places.back().patch == s.where.patch;
+    if (same && hollow <= most) continue;
+    if (same)
+      places.back() = s.where;
+    else
+      places.push_back(s.where);
+    most = hollow;
+  }
+  return places;
+}
+
 const SurfaceSample& most_concave(const std::vector<SurfaceSample>& samples) {
   const auto bend = [](const SurfaceSample& s) { return s.k_min * s.spacing * s.spacing; };
   return *std::min_element(samples.begin(), samples.end(),
@@ -276,8 +296,10 @@ Dent find_dent(const Shape& shape, const std::vector<SurfaceSample>& samples, co
   const Leaf* inward = most_concave(leaves, size);
   const SurfaceSample& concave = most_concave(samples);
   std::vector<SurfacePoint> places = places_on_dented_edges(shape.links, shape.patches);
-  const bool suspect =
-      inward || !places.empty() || kinks.concave > kNoKink || concave.k_min < -kCurvatureNoise / size;
+  const std::vector<SurfacePoint> hollow = places_hardly_hollow(samples, size);
+  const bool clearly = inward || !places.empty() || kinks.concave > kNoKink ||
+                       concave.k_min < -kCurvatureNoise / size,
+             suspect = clearly || !hollow.empty();
   const Clouds clouds = choose(samples, suspect ? kPairsIfDented : kPairsIfConvex);
   const std::vector<double> support = sampled_support(clouds), depth = sampled_depth(clouds, support);
   std::vector<double> excess = support;
@@ -298,9 +320,14 @@ Dent find_dent(const Shape& shape, const std::vector<SurfaceSample>& samples, co
   SurfacePoint where;
   places.insert(places.end(), {clouds.places[highest], clouds.places[deepest], concave.where, kinks.deepest});
   if (inward) places.push_back(inward->middle);
-  dent.excess =
-      std::max(dent.excess, worst_of([&](const auto& at) { return probe.excess(at); }, places, step, where));
-  const double found = worst_of([&](const auto& at) { return probe.depth(at); }, places, step, where);
+  const auto excess_at = [&](const auto& at) { return probe.excess(at); };
+  const double twisted = hollow.empty() ? 0 : worst_of(excess_at, hollow, step, where),
+               seen = std::max(twisted, worst_of(excess_at, places, step, where));
+  if (!clearly && seen <= kNoDent * size) return dent;
+  dent.excess = std::max(dent.excess, seen);
+  double found = worst_of([&](const auto& at) { return probe.depth(at); }, places, step, where);
+  // Of walls hardly twisted the hull's plane is lost in round-off.
+  found = std::max(found, kLeastDepth * twisted);
   if (found > dent.depth) {
     dent.depth = found;
     dent.where = where;

@@ -30,7 +30,8 @@ std::vector<SurfaceSample> sample_surface(const std::vector<BezierPatch>& patche
         const LocalForm f = local_form(patches[p], i / (n - 1.0), j / (n - 1.0));
         const double spacing = std::max(f.su.norm(), f.sv.norm()) / (n - 1);
         (f.in_line() ? in_line : samples)
-            .push_back({{static_cast<int>(p), f.u, f.v}, f.point, f.normal, f.k_min, f.k_max, spacing});
+            .push_back(
+                {{static_cast<int>(p), f.u, f.v}, f.point, f.normal, f.k_min, f.k_max, f.noise, spacing});
       }
     }
     if (samples.size() == before) samples.insert(samples.end(), in_line.begin(), in_line.end());

@@ -12,6 +12,7 @@ struct SurfaceSample {
   SurfacePoint where;
   Vec3 point, normal;   // normal outward
   double k_min, k_max;  // principal curvatures, positive on a convex body
+  double noise;         // round-off of them
   double spacing;       // distance to the next sample, about
 };
 

@@ -9,6 +9,8 @@
 namespace nurbs {
 namespace {
 
+constexpr double kFormRoundoff = 32 * kRoundoff;
+
 double tangent_size(const BezierPatch& patch) {
   const Jet1 j = evaluate1(patch, 0.5, 0.5);
   return j.su.norm() * j.sv.norm();
@@ -33,6 +35,10 @@ LocalForm from_jet(const Jet2& j, double u, double v) {
   const double spread = std::hypot(0.5 * (s(0, 0) - s(1, 1)), s(0, 1));
   f.k_min = mean - spread;
   f.k_max = mean + spread;
+  // Derivatives are off by ulps of all that they are made of, the normal by that over the sine.
+  const double all = j.s.norm() + j.su.norm() + j.sv.norm() + j.suu.norm() + 2 * j.suv.norm() + j.svv.norm();
+  const double metric = f.first.determinant() / f.first.trace();  // no more than its least eigenvalue
+  f.noise = kFormRoundoff * all / (metric * f.sine());
   return f;
 }
 

@@ -17,6 +17,7 @@ struct LocalForm {
   Mat2 first = Mat2::Zero();    // E F G
   Mat2 second = Mat2::Zero();   // -(L M N)
   double k_min = 0, k_max = 0;  // principal curvatures, 1/length
+  double noise = 0;             // of them: round-off, about
 
   // Tangents in line: the normal is what the last digits of the control points make of it.
   bool in_line() const { return sine() <= kLeastSine; }

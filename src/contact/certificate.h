@@ -25,6 +25,17 @@
 
 namespace nurbs {
 
+// rad: what a normal errs by that is none, or points anywhere.
+constexpr double kNoNormal = M_PI;
+
+// |Su x Sv|^2 up to which so much of a normal is the tangents' round-off, both short or in line, that it
+// counts: `speed2` is |Su|^2 + |Sv|^2 and `size` the body's.
+template <class Number>
+Number lost_area2(const Number& speed2, const Number& size) {
+  constexpr double kLost = kTangentNoise / kNormalLost;
+  return kLost * kLost * size * size * speed2;
+}
+
 struct Bracket {
   double lower, upper;  // of the gap
   Vec3 direction;       // the unit d the lower bound was taken along
@@ -56,9 +67,10 @@ inline RollingRadii radii_at(const Shape& shape, const SurfacePoint& at, const M
 inline Bracket certify(const PairFrame& pair, const PointPair& p, double noise_a, double noise_b) {
   const RollingRadii radii_a = radii_at(*pair.a, p.on_a, nullptr, p.na),
                      radii_b = radii_at(*pair.b, p.on_b, &pair.turn, p.nb);
-  // A flat part has no largest ball; one as large as the other body's reach does.
-  const double rho_a = std::min(pair.scale_a * radii_a.inner, pair.reach);
-  const double rho_b = std::min(pair.scale_b * radii_b.inner, pair.reach);
+  // A flat part has no largest ball; one as large as the other body's reach does. Where the normal points
+  // anywhere none is known to touch.
+  const double rho_a = noise_a < kNoNormal ? std::min(pair.scale_a * radii_a.inner, pair.reach) : 0;
+  const double rho_b = noise_b < kNoNormal ? std::min(pair.scale_b * radii_b.inner, pair.reach) : 0;
   const Vec3 core = (p.b - rho_b * p.nb) - (p.a - rho_a * p.na);
   const double distance = core.norm();
   const Vec3 mean = p.na - p.nb;
@@ -78,6 +90,7 @@ inline Bracket certify(const PairFrame& pair, const PointPair& p, double noise_a
   bracket.upper = distance - rho_a - rho_b + slack + roundoff;
   bracket.lower = d.dot(p.b - p.a) - support_excess(*pair.a, pair.scale_a, radii_a, d, p.na, noise_a) -
                   support_excess(*pair.b, pair.scale_b, radii_b, -d, p.nb, noise_b) - roundoff;
+  if (!(d.squaredNorm() > 0)) bracket.lower = -kFarAway;
   return bracket;
 }
 

@@ -62,10 +62,12 @@ NURBS_INLINE Sides look(unsigned open, const Shape* const (&shape)[kWidth], cons
   const Wide lu = norm2(su), lv = norm2(sv);
   constexpr double kLost = kNearPole * kNearPole;  // nearer, round-off counts in the certificate
   out.plain = (lu >= kLost * lv) & (lv >= kLost * lu);
-  const V n = normalized(cross(su, sv));
+  const V area = cross(su, sv), n = normalized(area);
   out.inner = out.outer = out.slack = out.near = Wide{};
+  Wide size{};
   for (int l = 0; l < kWidth; ++l) {
     if (!(open >> l & 1)) continue;
+    size[l] = shape[l]->bounding_radius;
     const RollingRadii r = radii_at(*shape[l], at[l], nullptr, lane(n, l));
     out.inner[l] = r.inner;
     out.outer[l] = r.outer;
@@ -73,6 +75,7 @@ NURBS_INLINE Sides look(unsigned open, const Shape* const (&shape)[kWidth], cons
     out.near[l] = r.near;
     dented[l] = dented[l] || (r.slack > kRoundoff * shape[l]->bounding_radius && !(r.near < kFarAway));
   }
+  out.plain &= norm2(area) > lost_area2<Wide>(lu + lv, size);
   out.inner *= scale;
   out.outer *= scale;
   out.slack *= scale;

@@ -111,7 +111,7 @@ NURBS_INLINE SurfacePoint advance(const Shape& shape, const SurfacePoint& p, con
 struct Normal {
   Vec3 direction;
   bool polar;
-  double noise = 0;  // rad: of the shorter tangent's round-off, where that counts
+  double noise = 0;  // rad: of the tangents' round-off, where that counts; kNoNormal where there is none
 };
 NURBS_INLINE Normal outward(const JetLanes& j, const SurfacePoint& at, double size) {
   const Vec3 su = j.at(Slot::kSu), sv = j.at(Slot::kSv);
@@ -127,6 +127,9 @@ NURBS_INLINE Normal outward(const JetLanes& j, const SurfacePoint& at, double si
     const Vec3 suv = j.at(Slot::kSuv);
     n.direction = lu < lv ? suv.cross(sv) : su.cross(suv);
     if ((lu < lv ? at.v : at.u) >= 0.5) n.direction = -n.direction;
+  } else if (const double area2 = n.direction.squaredNorm(); area2 <= lost_area2(lu + lv, size)) {
+    n.noise =
+        area2 > 0 ? std::min(kNoNormal, kTangentNoise * size * std::sqrt((lu + lv) / area2)) : kNoNormal;
   }
   n.direction.normalize();
   return n;

@@ -87,6 +87,7 @@ constexpr int kCubicAngles = 16;           // at which the third-order form is l
 constexpr double kAllowedDent = 1e-3;      // deeper is no convex body; up to this, a dent is left to the hull
 constexpr double kUnmentionedDent = 1e-6;  // deeper is worth a warning
 constexpr double kNoDent = 1e-13;          // round-off of a difference of supports
+constexpr double kHollowNoise = 2e-13;  // over the bounding radius: hollows of less curvature are no deeper
 constexpr int kPairsIfConvex = 1200, kPairsIfDented = 4000;  // samples compared with each other
 constexpr int kDentStarts = 1000;         // samples from which the best start of a support is taken
 constexpr int kTiltSections = 24;         // golden sections per direction in the search for the hull's plane
@@ -152,6 +153,7 @@ constexpr double kPoleSpeed = 1e-6;     // root of |Su x Sv| over the bounding r
 constexpr double kLeastSine = 1e-4;     // ... sine between the tangents, below which a normal is no proof
 constexpr double kNormalNoise = 4e-16;  // round-off of a normal whose tangents are at right angles
 constexpr double kTangentNoise = 4 * kRoundoff;  // of the body: round-off of a surface tangent
+constexpr double kNormalLost = 1e-9;             // rad, of a normal's round-off: below, it does not count
 constexpr double kFlatCurvature = 1e-12;   // over the bounding radius: a curvature below this says nothing
                                            // about how far to step
 constexpr double kSingularMetric = 1e-24;  // square of the sine of the angle between the tangents, below

@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include "body/joints.h"
+#include "contact/pair_search.h"
 #include "nurbs/tolerances.h"
 #include "shapes/revolved.h"
 #include "support/bodies.h"
@@ -143,6 +144,71 @@ TEST(NormalMap, promises_nothing_on_edges_that_run_through_dents) {
     }
   const Block convex(0.009, 0.2, 1);
   EXPECT_FALSE(convex.shape->dented());
+}
+
+// A frustum, radius 1 to 0.6 and height 2, of a ruled wall whose upper circle is parametrised a little
+// differently: lines of equal parameter are no longer those of the cone, and lie inside it.
+std::vector<NurbsSurface> twisted_frustum(double factor) {
+  std::vector<NurbsSurface> surfaces;
+  const double w = std::sqrt(0.5);
+  for (int quarter = 0; quarter < 4; ++quarter) {
+    const double c[3] = {1, 1, 0}, s[3] = {0, 1, 1}, weight[3] = {1, w, 1}, turn = 0.5 * M_PI * quarter;
+    std::vector<Vec4> wall, bottom, top;
+    for (int k = 0; k < 3; ++k) {
+      const double x = std::cos(turn) * c[k] - std::sin(turn) * s[k],
+                   y = std::sin(turn) * c[k] + std::cos(turn) * s[k], other = weight[k] * std::pow(factor, k);
+      const Vec4 low = weight[k] * Vec4(x, y, -1, 1), high = other * Vec4(0.6 * x, 0.6 * y, 1, 1);
+      wall.insert(wall.end(), {low, high});
+      bottom.insert(bottom.end(), {weight[k] * Vec4(0, 0, -1, 1), low});
+      top.insert(top.end(), {high, other * Vec4(0, 0, 1, 1)});
+    }
+    for (const auto& points : {wall, bottom, top}) surfaces.push_back(bezier_surface(2, 1, points));
+  }
+  return surfaces;
+}
+
+// How far below the frustum's cone the wall is, at most.
+double hollow(const NurbsSurface& wall, const Vec3& slope) {
+  double depth = 0;
+  for (double u = 0; u <= 1; u += 0.05)
+    for (double v = 0; v <= 1; v += 0.1) {
+      const Vec3 x = evaluate(wall, u, v);
+      depth = std::max(depth, slope.dot(Vec3(1 - std::hypot(x[0], x[1]), 0, -1 - x[2])));
+    }
+  return depth;
+}
+
+TEST(Dents, of_walls_hardly_twisted_are_seen) {
+  const Vec3 slope = Vec3(2, 0, 0.4).normalized();  // the cone's normal in its meridian
+  Random random(7);
+  for (const double off : {3e-6, 1e-5, 1e-4, 3e-4, 1e-3}) {
+    SCOPED_TRACE(off);
+    const std::vector<NurbsSurface> surfaces = twisted_frustum(1 + off);
+    const ShapePointer shape = make_shape("twisted", surfaces);
+    const double depth = hollow(surfaces[0], slope);
+    ASSERT_GT(depth, 0.01 * off * off);
+    EXPECT_GE(shape->support_excess, depth);
+    EXPECT_LE(shape->support_excess, 10 * depth);
+    EXPECT_LE(shape->concavity, shape->support_excess);
+    EXPECT_GE(shape->concavity, 0.5 * depth);
+    // Small balls on the wall: the hull's is the cone's.
+    for (int k = 0; k < 60; ++k) {
+      const double size = random.log_uniform(1e-4, 1), turn = random.uniform(0, 2 * M_PI),
+                   z = random.uniform(-0.6, 0.6), r = 0.8 - 0.2 * z,
+                   gap = random.uniform(-1, 1) * size * random.log_uniform(1e-7, 1e-2);
+      const Vec3 n(std::cos(turn) * slope[0], std::sin(turn) * slope[0], slope[2]),
+          at(r * std::cos(turn), r * std::sin(turn), z);
+      const Particle body{shape.get(), 1, Vec3::Zero(), Quat::Identity()},
+          ball{sphere().get(), size, at - shape->mass.center + (size + gap) * n, random.turn()};
+      double memory[kPairMemorySize] = {0};
+      ContactSettings settings;
+      settings.tolerance = 1e-9;
+      const ContactResult found = find_contact(body, ball, settings, memory);
+      EXPECT_EQ(found.status, Status::converged);
+      EXPECT_LE(found.lower, gap + 2e-15);
+      EXPECT_GE(found.upper, gap - 2e-15);
+    }
+  }
 }
 
 TEST(DentedParts, are_those_of_dents) {

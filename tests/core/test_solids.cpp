@@ -405,6 +405,22 @@ TEST(SavedCases, an_edge_that_runs_through_a_dent) {
   expect_resolved({{"dented-edge.json", -7.934827e-06}});
 }
 
+// Missed, and certified: a wall twisted by so little that its hollow was taken for round-off, deep beside the
+// ball's tolerance.
+TEST(SavedCases, a_ball_on_a_wall_that_is_hardly_twisted) {
+  expect_resolved({{"twisted-wall-ball.json", -9.1977e-12}});
+}
+
+// Converged along a normal of length 0: corners at which both tangents vanish.
+TEST(SavedCases, corners_without_speed) {
+  const PairCase pair = read_pair_case("tests/cases/corners-without-speed.json");
+  double memory[kPairMemorySize] = {0};
+  const ContactResult r = find_contact(pair.a, pair.b, pair.settings, memory);
+  EXPECT_EQ(r.status, Status::converged);
+  EXPECT_NEAR(r.normal.norm(), 1, 1e-12);
+  EXPECT_NEAR(r.gap, -1e-10, 1.5e-9);
+}
+
 // Left unresolved: a cone's part makes a ring of directions alike that is no whole one.
 TEST(SavedCases, flat_valleys_of_sphericons) {
   expect_resolved({{"sphericon-twins.json", -0.0186263492}, {"vertex-in-sphericon.json", -0.013812608}});
