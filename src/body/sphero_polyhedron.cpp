@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "body/bounds.h"
+#include "body/connectivity.h"
 #include "body/rounding.h"
 #include "body/shape.h"
 
@@ -115,7 +116,8 @@ class Finder {
   BallHull hull() {
     BallHull out;
     out.error = shape_.concavity + kJointRoundoff * shape_.bounding_radius;
-    if (!is_smooth() || !all_balls(&out) || out.centres.size() < 2 || !all_between()) return {};
+    if (!is_smooth(true) || !all_balls(&out) || !all_tips(&out)) return {};
+    if (out.centres.size() < 2 || !all_between()) return {};
     const double off = off_hull(out);
     if (!(off <= kMostOff * shape_.bounding_radius)) return {};
     out.error += off;
@@ -123,10 +125,11 @@ class Finder {
   }
 
  private:
-  bool is_smooth() const {
+  // But for tips of cones, if those are let be.
+  bool is_smooth(bool with_tips = false) const {
     for (const auto& links : shape_.links)
       for (const EdgeLink& link : links)
-        if (!(std::abs(link.kink) <= kMostKink)) return false;
+        if (!(std::abs(link.kink) <= kMostKink || (with_tips && link.collapsed))) return false;
     return true;
   }
   bool all_between() const {
@@ -162,6 +165,25 @@ class Finder {
       out->radii.push_back(seen[k].radius);
       on_ball_[k] = true;
     }
+    return true;
+  }
+
+  // Tips of cones, as balls of radius 0; false if there are too many.
+  bool all_tips(BallHull* out) const {
+    for (size_t k = 0; k < shape_.links.size(); ++k)
+      for (int edge = 0; edge < 4; ++edge) {
+        const EdgeLink& link = shape_.links[k][edge];
+        if (!link.collapsed || std::abs(link.kink) <= kMostKink) continue;
+        const Vec2 at = edge_parameters(edge, 0.5);
+        const Vec3 tip = evaluate0(shape_.patches[k], at[0], at[1]);
+        const auto same = [&](const Vec3& x) {
+          return (x - tip).norm() <= kSamePoint * shape_.bounding_radius;
+        };
+        if (std::any_of(out->centres.begin(), out->centres.end(), same)) continue;
+        if (static_cast<int>(out->centres.size()) == kMostBalls) return false;
+        out->centres.push_back(tip);
+        out->radii.push_back(0);
+      }
     return true;
   }
 

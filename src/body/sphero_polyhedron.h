@@ -45,8 +45,9 @@ void archive(Archive& a, SpheroPolyhedron& s) {
 // Polyhedra: bilinear planar patches, whose corners are of the body and have it in their hull.
 SpheroPolyhedron find_sphero_polyhedron(const Shape& shape);
 
-// Hulls of a few balls of different radii, as tapered capsules are. For every unit d the body's support is
-// max over balls of d . centre + radius, within `error`. Lengths of the shape frame.
+// Hulls of a few balls of different radii, as tapered capsules are; the tip of a cone is a ball of radius 0.
+// For every unit d the body's support is max over balls of d . centre + radius, within `error`. Lengths of
+// the shape frame.
 struct BallHull {
   std::vector<Vec3> centres;  // none: the body is no such one, or isn't known to be
   std::vector<double> radii;

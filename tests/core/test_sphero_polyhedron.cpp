@@ -146,7 +146,8 @@ TEST(SpheroPolyhedron, saved_pairs) {
   }
 }
 
-// Balls of radii `low` about the origin and `high` about (0, 0, length), and the cone between.
+// Balls of radii `low` about the origin and `high` about (0, 0, length), and the cone between, which ends in
+// a tip there if that is 0.
 Body tapered(double low, double high, double length) {
   const double tilt = std::asin((low - high) / length);
   const auto arc = [](double z, double r, double from, double to) {
@@ -158,8 +159,10 @@ Body tapered(double low, double high, double length) {
     return ProfileArc{at(r, from), at(r / std::cos(half), middle), at(r, to), std::cos(half)};
   };
   const double pole = 0.5 * M_PI, turn = 0.5 * (tilt - pole);
-  Profile profile = {arc(0, low, -pole, turn), arc(0, low, turn, tilt), {}, arc(length, high, tilt, pole)};
-  profile[2] = {profile[1].to, Vec2::Zero(), profile[3].from, 0};
+  Profile profile = {arc(0, low, -pole, turn), arc(0, low, turn, tilt)};
+  const ProfileArc end = arc(length, high, tilt, pole);
+  profile.push_back({profile.back().to, Vec2::Zero(), high > 0 ? end.from : Vec2(0, length), 0});
+  if (high > 0) profile.push_back(end);
   return make_shape("tapered capsule", revolve(profile));
 }
 
@@ -181,17 +184,33 @@ TEST(BallHull, of_tapered_capsules) {
 
 // Against supports that know nothing of balls: the overlap along the normal is the one found, and no
 // direction of thousands, nor the best of them refined, has less.
+// A ball and a point: the cone's tip is a ball of no radius.
+TEST(BallHull, of_a_ball_and_a_tip) {
+  const Body body = tapered(1, 0, 2.5);
+  ASSERT_EQ(body->ball_hull.centres.size(), 2u);
+  const bool first = body->ball_hull.radii[0] > 0;
+  EXPECT_NEAR(body->ball_hull.radii[first ? 0 : 1], 1, 1e-12);
+  EXPECT_EQ(body->ball_hull.radii[first ? 1 : 0], 0);
+  EXPECT_LT((body->ball_hull.centres[first ? 1 : 0] + body->mass.center - Vec3(0, 0, 2.5)).norm(), 1e-12);
+  for (const Vec3& d : test::spiral(2000))
+    EXPECT_NEAR(find_hull_support(*body, d).h, std::max(1.0, 2.5 * d[2]) - d.dot(body->mass.center), 1e-12);
+  // A tip over a sharp rim is no such body.
+  const Profile cone = {{Vec2(0, 0), Vec2::Zero(), Vec2(1, 0), 0}, {Vec2(1, 0), Vec2::Zero(), Vec2(0, 2), 0}};
+  EXPECT_TRUE(make_shape("cone", revolve(cone))->ball_hull.centres.empty());
+}
+
 TEST(BallHull, contacts_of_two_are_least_overlaps) {
   Random random(8);
   const std::vector<Body> bodies = {tapered(1, 0.5, 1.5),
                                     tapered(0.8, 0.3, 1),
                                     tapered(1, 0.9, 0.3),
+                                    tapered(0.7, 0, 2),
                                     make_shape("capsule", capsule(0.5, 2)),
                                     make_shape("ball", exact_ellipsoid({0.7, 0.7, 0.7})),
                                     rounded("tetrahedron", 0.1)};
   const std::vector<Vec3> spiral = test::spiral(1500);
   for (int k = 0; k < 240; ++k) {
-    const Shape &sa = *bodies[random.below(3)], &sb = k % 8 == 1 ? sa : *bodies[random.below(6)];
+    const Shape &sa = *bodies[random.below(4)], &sb = k % 8 == 1 ? sa : *bodies[random.below(7)];
     Particle a{&sa, 1, Vec3::Zero(), random.turn()},
         b{&sb, random.log_uniform(0.3, 3), Vec3::Zero(), random.turn()};
     if (k % 4 == 1) b.q = a.q;
