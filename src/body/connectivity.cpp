@@ -162,10 +162,12 @@ void add_candidates(const std::vector<BezierPatch>& patches, const std::vector<E
       }
     }
     const bool closed = (a.at.front() - a.at.back()).norm() <= tolerance;
-    if (c.gap > tolerance && !closed && curve_gap(patches, a, b) <= tolerance) {
-      c.ratio = 1;
-      c.projected = true;
-      c.gap = gap(c);
+    if (c.gap > kSameParameters * tolerance && !closed && curve_gap(patches, a, b) <= tolerance) {
+      Candidate other = c;
+      other.ratio = 1;
+      other.projected = true;
+      other.gap = gap(other);
+      if (c.gap > tolerance || other.gap < kNotByChance * c.gap) c = other;
     }
     if (c.gap <= tolerance) out.push_back(c);
   }

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <limits>
 
+#include "body/common_conic.h"
 #include "body/connectivity.h"
 #include "body/edge_polynomials.h"
 #include "nurbs/tolerances.h"
@@ -107,7 +108,7 @@ double bound_projected_gap(const BezierPatch& a, int edge, const BezierPatch& b,
     before = s;
     last_gap = end_gap;
   }
-  return gap;
+  return std::min(gap, common_conic_gap(ca, cb, link.reversed, gap));
 }
 
 // Normal along an edge, outward, any length: w^3 (x_u cross x_v) of the homogeneous (X, w), by which it is

@@ -7,6 +7,8 @@
 
 #include "body/connectivity.h"
 #include "body/shape.h"
+#include "body/support.h"
+#include "nurbs/bernstein.h"
 #include "shapes/primitives.h"
 #include "shapes/revolved.h"
 #include "support/random.h"
@@ -159,6 +161,62 @@ TEST(Connectivity, SidesMayBeParametrisedDifferently) {
   EXPECT_TRUE(shape->smooth);
   EXPECT_NEAR(shape->mass.volume, 4 * M_PI, 1e-9);
   expect_consistent(*shape, 1);
+}
+
+// A cylinder of radius 1 and height 2 of `arcs` walls, whose circles run as 2 t (1 - t) m + t^2 of the
+// parameter that those of the caps have, or a little off the circle.
+Surfaces cylinder_of_other_parameters(int arcs, double m, double off = 0) {
+  Surfaces body;
+  const auto times = [](double f, double g) { return f * g; };
+  const Bernstein<double> s = {0, m, 1}, rest = {1, 1 - m, 0};
+  const Bernstein<double> basis[3] = {multiply(rest, rest, times), multiply(s, rest, times),
+                                      multiply(s, s, times)};
+  const double half = M_PI / arcs, w = std::cos(half);
+  for (int k = 0; k < arcs; ++k) {
+    std::vector<Vec4> arc;
+    for (int i = -1; i <= 1; ++i) {
+      const double turn = (2 * k + i) * half, r = i == 0 ? 1 / w : 1, weight = i == 0 ? w : 1;
+      arc.push_back(weight * Vec4(r * std::cos(turn), r * std::sin(turn), 0, 1));
+    }
+    const auto level = [](const Vec4& p, double z) { return Vec4(p[0], p[1], z * p[3], p[3]); };
+    std::vector<Vec4> wall, bottom, top;
+    for (size_t i = 0; i < 5; ++i) {
+      Vec4 p = basis[0][i] * arc[0] + 2 * basis[1][i] * arc[1] + basis[2][i] * arc[2];
+      if (i == 2) p.head<2>() *= 1 + off;
+      wall.insert(wall.end(), {level(p, -1), level(p, 1)});
+    }
+    for (const Vec4& p : arc) {
+      bottom.insert(bottom.end(), {p[3] * Vec4(0, 0, -1, 1), level(p, -1)});
+      top.insert(top.end(), {level(p, 1), p[3] * Vec4(0, 0, 1, 1)});
+    }
+    body.push_back(bezier_surface(4, 1, wall));
+    body.push_back(bezier_surface(2, 1, bottom));
+    body.push_back(bezier_surface(2, 1, top));
+  }
+  return body;
+}
+
+TEST(Connectivity, SidesOnOneConicMayHaveAnyParameters) {
+  Random random(3);
+  for (const int arcs : {3, 4, 8})
+    for (const double m : {0.5, 0.499, 0.45, 0.3}) {
+      SCOPED_TRACE(std::to_string(arcs) + " arcs, " + std::to_string(m));
+      const auto shape = build(cylinder_of_other_parameters(arcs, m));
+      EXPECT_EQ(shape->joint_slack, 0);
+      EXPECT_LT(shape->support_excess, 1e-12);
+      EXPECT_NEAR(shape->mass.volume, 2 * M_PI, 1e-9);
+      for (int k = 0; k < 50; ++k) {
+        const Vec3 d = random.direction();
+        EXPECT_NEAR(find_hull_support(*shape, d).h, std::hypot(d[0], d[1]) + std::abs(d[2]), 1e-13);
+      }
+    }
+}
+
+// Off the conic by what still is a gap, and by what is none.
+TEST(Connectivity, SidesOffOneConicAreApart) {
+  const auto shape = build(cylinder_of_other_parameters(12, 0.45, 1e-7));
+  EXPECT_GT(shape->joint_slack, 2e-8);
+  EXPECT_TRUE(contains(error_of(cylinder_of_other_parameters(12, 0.45, 1e-4)), "has no partner"));
 }
 
 TEST(Connectivity, SmallGapsAreAcceptedLargeOnesNamed) {
