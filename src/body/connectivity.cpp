@@ -40,25 +40,27 @@ Edge make_edge(const BezierPatch& patch, int index, int edge, double tolerance) 
   return e;
 }
 
-// Parameter of the point of an edge closest to x: the best of a row of samples, then golden-section search
-// between its neighbours.
+// Parameter of the point of an edge closest to x: golden-section search about every sample of a row that is
+// nearer than those beside it, for the sides of a hairpin may both be near.
 double closest_parameter(const BezierPatch& patch, int edge, const Vec3& x) {
-  int best = 0;
-  double least = std::numeric_limits<double>::infinity();
+  const auto distance2 = [&](double t) { return (edge_point(patch, edge, t) - x).squaredNorm(); };
+  std::array<double, kProjectionSamples + 1> at;
+  for (int k = 0; k <= kProjectionSamples; ++k) at[k] = distance2(k / double(kProjectionSamples));
+  double best = 0, least = std::numeric_limits<double>::infinity();
   for (int k = 0; k <= kProjectionSamples; ++k) {
-    const double d = (edge_point(patch, edge, k / double(kProjectionSamples)) - x).squaredNorm();
-    if (d < least) least = d, best = k;
+    if ((k > 0 && at[k - 1] < at[k]) || (k < kProjectionSamples && at[k + 1] <= at[k])) continue;
+    double lo = std::max(0, k - 1) / double(kProjectionSamples),
+           hi = std::min(kProjectionSamples, k + 1) / double(kProjectionSamples);
+    constexpr double kGolden = 0.6180339887498949;
+    for (int i = 0; i < kProjectionSections; ++i) {
+      const double a = hi - kGolden * (hi - lo), b = lo + kGolden * (hi - lo);
+      const bool left = distance2(a) < distance2(b);
+      (left ? hi : lo) = left ? b : a;
+    }
+    const double found = distance2(0.5 * (lo + hi));
+    if (found < least) least = found, best = 0.5 * (lo + hi);
   }
-  double lo = std::max(0, best - 1) / double(kProjectionSamples);
-  double hi = std::min(kProjectionSamples, best + 1) / double(kProjectionSamples);
-  constexpr double kGolden = 0.6180339887498949;
-  for (int i = 0; i < kProjectionSections; ++i) {
-    const double a = hi - kGolden * (hi - lo), b = lo + kGolden * (hi - lo);
-    const bool left =
-        (edge_point(patch, edge, a) - x).squaredNorm() < (edge_point(patch, edge, b) - x).squaredNorm();
-    (left ? hi : lo) = left ? b : a;
-  }
-  return 0.5 * (lo + hi);
+  return best;
 }
 
 constexpr double kNoGap = 1e-6;        // of the tolerance: sides so near have the same parameters
@@ -115,12 +117,13 @@ bool ends_agree(const Edge& a, const Edge& b, bool reversed, double tolerance) {
   return (a.at.front() - first).norm() <= tolerance && (a.at.back() - last).norm() <= tolerance;
 }
 
-// The ratio of the map that takes a's middle to the closest point of b.
-double ratio_between(const std::vector<BezierPatch>& patches, const Edge& a, const Edge& b) {
-  const double t = closest_parameter(patches[b.patch], b.edge, a.at[kEdgeSamples / 2]);
-  const double s =
-      std::clamp(closest_on_edge(patches[b.patch], b.edge, a.at[kEdgeSamples / 2], t), 1e-6, 1 - 1e-6);
-  return s / (1 - s);
+// The ratio of the map that takes a's point at quarter `k` of its parameter to the closest point of b.
+double ratio_between(const std::vector<BezierPatch>& patches, const Edge& a, const Edge& b, bool reversed,
+                     int k) {
+  const Vec3& x = a.at[k * (kEdgeSamples - 1) / 4];
+  const double t = closest_parameter(patches[b.patch], b.edge, x), from = (reversed ? 4 - k : k) / 4.0,
+               to = std::clamp(closest_on_edge(patches[b.patch], b.edge, x, t), 1e-6, 1 - 1e-6);
+  return to / (1 - to) * (1 - from) / from;
 }
 
 // The same from the weights at the ends, exactly: in t / (1 - t) a map of that form multiplies the k-th
@@ -154,12 +157,16 @@ void add_candidates(const std::vector<BezierPatch>& patches, const std::vector<E
     c.gap = gap(c);
     if (c.gap > kNoGap * tolerance) {  // other parameters may fit better, among rounded digits by chance
       const double share = c.gap > kSameParameters * tolerance ? 0.5 : kNotByChance;
-      for (const double ratio : {ratio_of_weights(patches, a, b, reversed), ratio_between(patches, a, b)}) {
+      const auto with = [&](double ratio) {
         Candidate other = c;
         other.ratio = ratio;
         other.gap = gap(other);
         if (other.gap < share * c.gap) c = other;
-      }
+      };
+      with(ratio_of_weights(patches, a, b, reversed));
+      // Round a needle's tip the closest point of the middle may be the other side's.
+      for (const int quarter : {2, 1, 3})
+        if (quarter == 2 || c.gap > tolerance) with(ratio_between(patches, a, b, reversed, quarter));
     }
     const bool closed = (a.at.front() - a.at.back()).norm() <= tolerance;
     if (c.gap > kSameParameters * tolerance && !closed && curve_gap(patches, a, b) <= tolerance) {

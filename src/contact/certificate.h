@@ -36,6 +36,14 @@ Number lost_area2(const Number& speed2, const Number& size) {
   return kLost * kLost * size * size * speed2;
 }
 
+// Squared angle up to which a bracket's normal may still be off, for the overlap along the one that the last
+// step makes of it to be right to the tolerance: that errs by some kTurnRate times the square, which counts
+// by the larger body's reach. Of bodies of like sizes closed brackets see to that.
+template <class Number>
+Number turn_allowance(const Number& angle2, const Number& reach) {
+  return kTurnRate * kTurnRate * reach * angle2 * angle2;
+}
+
 struct Bracket {
   double lower, upper;  // of the gap
   Vec3 direction;       // the unit d the lower bound was taken along

@@ -258,8 +258,11 @@ unsigned follow_joints(unsigned asked, double enough, JointLanes* pairs) {
     const Wide tolerance = pairs->tolerance, width = bracket.upper - bracket.lower;
     const WideMask usual = mask_of(open) & step.regular & a.plain & b.plain & bracket.apart &
                            (bracket.lower <= enough) & next.inside();
-    const WideMask close = (width <= tolerance) &
-                           (bracket.angle2 * pairs->size <= larger<Wide>(tolerance, kRoundoff * pairs->size));
+    const WideMask close =
+        (width <= tolerance) &
+        (bracket.angle2 * pairs->size <= larger<Wide>(tolerance, kRoundoff * pairs->size)) &
+        ((pairs->reach <= kUnequalSizes * pairs->size) |
+         (turn_allowance(bracket.angle2, pairs->reach) <= tolerance));
 
     // The step spent on a second-order update of points and normal.
     const V of_a = turned_normal(a.normal, a.at, bend_a, step.metric_a, step.au, step.av),

@@ -180,8 +180,9 @@ NURBS_INLINE bool refine(const PairFrame& pair, JointSolution& s, const Forms& a
 
 // Gap within the tolerance, and the points after one more Newton step too: near-spheres have the first long
 // before the second.
-bool close_enough(const Bracket& bracket, double tolerance, double size) {
-  return bracket.width() <= tolerance && bracket.angle2 * size <= std::max(tolerance, kRoundoff * size);
+bool close_enough(const Bracket& bracket, double tolerance, double size, double reach) {
+  return bracket.width() <= tolerance && bracket.angle2 * size <= std::max(tolerance, kRoundoff * size) &&
+         (reach <= kUnequalSizes * size || turn_allowance(bracket.angle2, reach) <= tolerance);
 }
 
 // What local maxima of both bodies may lack of their supports.
@@ -259,7 +260,8 @@ JointSolution solve_joint(const PairFrame& pair, const SurfacePoint& on_a, const
     p.nb = nb.direction;
     out.bracket = certify(pair, p, na.noise, nb.noise);
     out.dented = out.bracket.dented;
-    out.converged = close_enough(out.bracket, tolerance, pair.size) || far_enough(out.bracket, enough);
+    out.converged =
+        close_enough(out.bracket, tolerance, pair.size, pair.reach) || far_enough(out.bracket, enough);
     out.stationary = !out.converged && is_stationary(pair, p);
     const Forms a(out.jet_a, p.na), b(out.jet_b, p.na);
     const Steps steps = newton_step(p, out.jet_a, a, b);

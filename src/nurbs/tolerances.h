@@ -189,6 +189,8 @@ constexpr double kNoDirection =
 constexpr double kSingular = 1e-13;  // 2 x 2 determinant over the sum of its products' sizes
 constexpr double kStationary =
     1e-10;  // angle between the normals, and offset across them over the smaller radius
+constexpr double kUnequalSizes = 100;  // ratio of the bodies' from which the larger one's reach counts ...
+constexpr double kTurnRate = 1e3;  // ... of how fast normals change: that of a rim of its radius over this
 constexpr double kLargestStep = 0.35;  // of a patch's parameter range in one Newton step
 constexpr double kNearer2 = 1e-3;  // squared offset across the normals over what it was: a step that leaves
                                    // more was none of Newton's, which squares it (next to poles)

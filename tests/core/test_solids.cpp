@@ -411,6 +411,17 @@ TEST(SavedCases, a_ball_on_a_wall_that_is_hardly_twisted) {
   expect_resolved({{"twisted-wall-ball.json", -9.1977e-12}});
 }
 
+// Converged, with a normal along which the overlap was off by four tolerances: Newton's last step turned the
+// rim of a lens 12,566 times as large.
+TEST(SavedCases, a_normal_on_the_rim_of_a_large_lens) {
+  const PairCase pair = read_pair_case("tests/cases/ellipsoid-on-large-lens.json");
+  double memory[kPairMemorySize] = {0};
+  const ContactResult r = find_contact(pair.a, pair.b, pair.settings, memory);
+  EXPECT_EQ(r.status, Status::converged);
+  EXPECT_NEAR(r.gap, 7.21272531e-5, 1e-9);
+  EXPECT_NEAR(-test::overlap_along(pair.a, pair.b, r.normal), r.gap, 1e-9);
+}
+
 // Converged along a normal of length 0: corners at which both tangents vanish.
 TEST(SavedCases, corners_without_speed) {
   const PairCase pair = read_pair_case("tests/cases/corners-without-speed.json");
