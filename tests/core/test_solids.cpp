@@ -14,6 +14,7 @@
 #include "io/pair_case.h"
 #include "io/shape_file.h"
 #include "support/least_overlap.h"
+#include "support/pairs.h"
 #include "support/solid_families.h"
 
 namespace nurbs {
