@@ -26,7 +26,9 @@ namespace nurbs {
 //     b, less its rate times the angle, as far as that is known, then from the nodes and cells nearest to d,
 //     in steps over their caps. The first of these is of the points themselves, wherever they lie; of a
 //     dented body no step to the next is known, but p is no less than the overlap of the points reached,
-//     p'' + p = 0: about a minimum on a face, from which p rises as from a corner's, that reaches far.
+//     p'' + p = 0: about a minimum on a face, from which p rises as from a corner's, that reaches far. Where
+//     all that reaches too little, as in valleys, and where cells would want many supports, caps are widened
+//     by points of both bodies round the minimum (widen_cap.h).
 // Hypotheses: those of the inner maps and rates; all are checked. Minima of dented bodies are confirmed by
 // the hulls' supports. `proof`, if
 // asked for, is filled for the steps to come: cells then have to lie above T by a margin, and caps are cut,
