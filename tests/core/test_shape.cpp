@@ -219,6 +219,50 @@ TEST(Connectivity, SidesOffOneConicAreApart) {
   EXPECT_TRUE(contains(error_of(cylinder_of_other_parameters(12, 0.45, 1e-4)), "has no partner"));
 }
 
+// The same surface with a degree more in both parameters.
+NurbsSurface elevated(const NurbsSurface& s) {
+  const auto times = [](const Vec4& p, double f) { return Vec4(p * f); };
+  const auto raise = [&](const std::vector<Vec4>& points, int rows, int columns) {  // along the columns
+    std::vector<Vec4> out;
+    for (int i = 0; i < rows; ++i)
+      for (const Vec4& p :
+           multiply(Bernstein<Vec4>(points.begin() + i * columns, points.begin() + (i + 1) * columns),
+                    Bernstein<double>{1, 1}, times))
+        out.push_back(p);
+    return out;
+  };
+  const auto transposed = [](const std::vector<Vec4>& points, int rows, int columns) {
+    std::vector<Vec4> out;
+    for (int k = 0; k < columns; ++k)
+      for (int i = 0; i < rows; ++i) out.push_back(points[i * columns + k]);
+    return out;
+  };
+  const int u = s.size_u, v = s.size_v + 1;
+  const std::vector<Vec4> in_v = raise(s.points, u, s.size_v);
+  return bezier_surface(s.degree_u + 1, s.degree_v + 1,
+                        transposed(raise(transposed(in_v, u, v), v, u), v, u + 1));
+}
+
+// Needles with joints round their tips: the closest point of the other side's curve may be beyond the tip.
+TEST(Connectivity, SidesOfHairpinsAreFound) {
+  Random random(9);
+  for (int k = 0; k < 40; ++k) {
+    Surfaces body = exact_ellipsoid({1, 1, 1});
+    const Vec3 along = Vec3(random.uniform(-0.3, 0.3), 1, 1).normalized();  // a point of an edge of the cube
+    const Mat3 turn = Quat::FromTwoVectors(along, Vec3::UnitX()).toRotationMatrix();
+    NurbsSurface& other = body[random.below(body.size())];
+    other = elevated(other);
+    const double factor = random.log_uniform(0.1, 10), factor_v = random.log_uniform(0.1, 10);
+    for (int i = 0; i < other.size_u; ++i)
+      for (int j = 0; j < other.size_v; ++j) other.point(i, j) *= std::pow(factor, i) * std::pow(factor_v, j);
+    const double length = random.log_uniform(10, 1000);
+    move(body, turn, Vec3::Zero());
+    for (NurbsSurface& s : body)
+      for (Vec4& p : s.points) p[0] *= length;
+    EXPECT_EQ(error_of(body), "accepted") << k;
+  }
+}
+
 TEST(Connectivity, SmallGapsAreAcceptedLargeOnesNamed) {
   Surfaces body = exact_ellipsoid({1, 1, 1});
   for (Vec4& p : body[3].points) p[0] += 1e-6 * p[3];
