@@ -20,14 +20,6 @@ constexpr double kSameWay = 0.1;  // of the curve's extent: apart by less, both 
 constexpr double kNewton = 0.25;  // of what the gradient's bound allows
 
 using Scalars = Bernstein<double>;
-const auto kProduct = [](double x, double y) { return x * y; };
-
-Vec3 at(const Homogeneous& curve, double t) {
-  Homogeneous c = curve;
-  for (size_t n = c.size() - 1; n > 0; --n)
-    for (size_t i = 0; i < n; ++i) c[i] = (1 - t) * c[i] + t * c[i + 1];
-  return place(c[0]);
-}
 
 // q of (x, y, 1): x^2, x y, y^2, x, y, 1.
 using Conic = Eigen::Matrix<double, 6, 1>;
@@ -114,7 +106,7 @@ double distance(const Fit& f, const Conic& q) {
 double common_conic_gap(const Homogeneous& one, const Homogeneous& other, bool reversed, double along) {
   std::vector<Vec3> points;
   for (const Homogeneous* curve : {&one, &other})
-    for (int k = 0; k < kPoints; ++k) points.push_back(at(*curve, k / (kPoints - 1.0)));
+    for (int k = 0; k < kPoints; ++k) points.push_back(point_at(*curve, k / (kPoints - 1.0)));
   Vec3 centre = Vec3::Zero();
   for (const Vec3& x : points) centre += x / static_cast<double>(points.size());
   double size = 0;

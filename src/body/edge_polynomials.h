@@ -10,6 +10,7 @@ namespace nurbs {
 
 using Homogeneous = Bernstein<Vec4>;
 
+inline const auto kProduct = [](double x, double y) { return x * y; };
 inline const auto kScale = [](const Vec3& x, double w) { return Vec3(x * w); };
 inline const auto kCross = [](const Vec3& x, const Vec3& y) { return Vec3(x.cross(y)); };
 
@@ -25,6 +26,13 @@ inline Bernstein<double> weights(const Homogeneous& points) {
   Bernstein<double> w;
   for (const Vec4& p : points) w.push_back(p[3]);
   return w;
+}
+
+// The point of a curve at t, by de Casteljau.
+inline Vec3 point_at(Homogeneous curve, double t) {
+  for (size_t n = curve.size() - 1; n > 0; --n)
+    for (size_t i = 0; i < n; ++i) curve[i] = (1 - t) * curve[i] + t * curve[i + 1];
+  return place(curve[0]);
 }
 
 // Positions as seen from the first one of an edge, so that small patches far from the origin cancel little.

@@ -21,7 +21,6 @@ constexpr double kBendNoise = 64;
 using Scalars = Bernstein<double>;
 using Vectors = Bernstein<Vec3>;
 
-const auto kProduct = [](double x, double y) { return x * y; };
 const auto kDot = [](const Vec3& x, const Vec3& y) { return x.dot(y); };
 
 // Control points of the k-th row from an edge.
@@ -92,17 +91,13 @@ Homogeneous part(const Homogeneous& curve, double from, double to) {
 double bound_projected_gap(const BezierPatch& a, int edge, const BezierPatch& b, const EdgeLink& link) {
   const Homogeneous ca = row(a, edge, 0), cb = row(b, link.edge, 0);
   double gap = 0, before = link.reversed ? 1 : 0;
-  const auto on = [](const Homogeneous& c, double t) {
-    const Vec4 p = part(c, 0, t).back();
-    return Vec3(p.head<3>() / p[3]);
-  };
-  double last_gap = (on(ca, 0) - on(cb, before)).norm();
+  double last_gap = (point_at(ca, 0) - point_at(cb, before)).norm();
   for (int k = 1; k <= kProjectedPieces; ++k) {
     const double t0 = (k - 1.0) / kProjectedPieces, t1 = double(k) / kProjectedPieces;
     const Vec2 at = edge_parameters(edge, t1);
     const double s = k == kProjectedPieces ? (link.reversed ? 0 : 1)
                                            : projected_parameter(b, link, evaluate0(a, at[0], at[1]));
-    const double end_gap = (on(ca, t1) - on(cb, s)).norm();
+    const double end_gap = (point_at(ca, t1) - point_at(cb, s)).norm();
     gap = std::max(gap, std::max(last_gap, end_gap) + stray(part(ca, t0, t1)) +
                             stray(part(cb, std::min(before, s), std::max(before, s))));
     before = s;

@@ -36,11 +36,11 @@ Number lost_area2(const Number& speed2, const Number& size) {
   return kLost * kLost * size * size * speed2;
 }
 
-// Squared angle up to which a bracket's normal may still be off, for the overlap along the one that the last
-// step makes of it to be right to the tolerance: that errs by some kTurnRate times the square, which counts
-// by the larger body's reach. Of bodies of like sizes closed brackets see to that.
+// By how much the overlap along the normal that Newton's last step makes may be off, a length, where the
+// bracket's normals were off by an angle of this square: the new one errs by some kTurnRate times that, which
+// counts squared, by the larger body's reach. Of bodies of like sizes closed brackets see to it.
 template <class Number>
-Number turn_allowance(const Number& angle2, const Number& reach) {
+Number turn_error(const Number& angle2, const Number& reach) {
   return kTurnRate * kTurnRate * reach * angle2 * angle2;
 }
 

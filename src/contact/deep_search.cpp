@@ -143,7 +143,7 @@ class DeepSearch {
     threshold_ = least;
     const Vec3 before(proof.direction[0], proof.direction[1], proof.direction[2]);
     const double turned = angle_between(best_.bracket.direction, before) + kCapRoundoff;
-    if (!(cap_about(best_, bend_at(best_)).angle >= proof.angle + turned)) return false;
+    if (!(cap_about(best_, bend_at(best_), threshold_).angle >= proof.angle + turned)) return false;
     finish(s);
     return s->converged;
   }
@@ -272,9 +272,10 @@ class DeepSearch {
       if (d.dot(cap_[k].d) > 1 - 0.5 * kLeastCap * kLeastCap) return true;
     const LocalBend local = bend_at(s);
     Cap cap{d, 1, s.base_a, s.base_b, local.turn, local.reach > 0 ? 0 : kWidened.size()};
-    Grown grown = cap_about(s, local);
+    const double level = lowest ? threshold_ : this->level();
+    Grown grown = cap_about(s, local, level);
     if (grown.angle < kLeastCap)
-      grown = {widened(cap, std::max(grown.angle, held(s)), kWidened[0], lowest ? threshold_ : level()), 0};
+      grown = {widened(cap, std::max(grown.angle, held(s, level)), kWidened[0], level), 0};
     if (lowest) {
       closed_ = grown.angle >= kLeastCap;
       best_cap_ = caps_;
@@ -293,10 +294,10 @@ class DeepSearch {
     return true;
   }
 
-  // How far a minimum's points overlap by what p has to be.
-  double held(const JointSolution& s) const {
+  // How far a minimum's points overlap by a level.
+  double held(const JointSolution& s, double level) const {
     const Vec3 &d = s.bracket.direction, g = s.jet_a.at(JetLanes::kS) - s.jet_b.at(JetLanes::kS);
-    const double y = d.dot(g), room = y - threshold_ - margin_ - noise_, falls = (g - y * d).norm() + noise_;
+    const double y = d.dot(g), room = y - level - noise_, falls = (g - y * d).norm() + noise_;
     return room > 0 ? 2 * room / (falls + std::sqrt(falls * falls + 2 * y * room)) : 0;
   }
 
@@ -306,15 +307,14 @@ class DeepSearch {
     const Vec3 &d = cap.d, t = d.unitOrthogonal(), on_b = pair_.direction_on_b(d);
     const CappedMinimum minimum{d, t, d.cross(t), cap.on_a, cap.on_b, cap.turn, level, tolerance_};
     const InnerNode &a = nearest(inner_a_, d), &b = nearest(inner_b_, on_b);
-    const double off = std::max(angle_between(d, a.normal), angle_between(on_b, b.normal)) + kCapRoundoff;
-    for (int k = 0; k < kCaps; ++k) {
-      const CapBalls balls{pair_.scale_a * a.radius[k], pair_.scale_b * b.radius[k], kInnerCaps[k] - off};
-      const double next =
-          k + 1 < kCaps ? pair_.scale_a * a.radius[k + 1] + pair_.scale_b * b.radius[k + 1] : 0;
-      if (balls.valid < wanted && next > kAsLarge * (balls.radius_a + balls.radius_b)) continue;
-      proven = widen_cap(pair_, minimum, balls, proven, wanted, kMostWidening, &widening_);
-    }
-    return widen_cap(pair_, minimum, {}, proven, wanted, kMostWidening, &widening_);
+    const double off = this->off(d, on_b, a.normal, b.normal);
+    CapBalls balls[kCaps + 1];  // none at last
+    for (int k = 0; k < kCaps; ++k)
+      balls[k] = {pair_.scale_a * a.radius[k], pair_.scale_b * b.radius[k], kInnerCaps[k] - off};
+    for (int k = 0; k <= kCaps; ++k)
+      if (balls[k].valid >= wanted || balls[k + 1].sum() <= kAsLarge * balls[k].sum())
+        proven = widen_cap(pair_, minimum, balls[k], proven, wanted, kMostWidening, &widening_);
+    return proven;
   }
 
   // The cap nearest to a direction; whether it is wider now.
@@ -340,21 +340,20 @@ class DeepSearch {
     return true;
   }
 
-  // How far from a stationary direction p is proven to be at least what it has to be, the threshold about the
-  // least minimum.
-  Grown cap_about(const JointSolution& s, const LocalBend& local) const {
-    const double level =
-        -s.bracket.lower - kFromThreshold * tolerance_ > threshold_ ? this->level() : threshold_;
+  // By how much a direction is off two others, one of each body's, at most.
+  static double off(const Vec3& d, const Vec3& on_b, const Vec3& near_d, const Vec3& near_on_b) {
+    return std::acos(std::min(1.0, std::min(d.dot(near_d), on_b.dot(near_on_b)))) + kCapRoundoff;
+  }
+
+  // How far from a stationary direction p is proven to be at least a level.
+  Grown cap_about(const JointSolution& s, const LocalBend& local, double level) const {
     const Vec3& d = s.bracket.direction;
     const Vec3 g = s.jet_a.at(JetLanes::kS) - s.jet_b.at(JetLanes::kS), on_b = pair_.direction_on_b(d);
     const InnerNode &na = nearest(inner_a_, d), &nb = nearest(inner_b_, on_b);
     const int cell_a = InnerMap::cell(d), cell_b = InnerMap::cell(on_b);
     const InnerStretch &sa = inner_a_.stretches[cell_a], &sb = inner_b_.stretches[cell_b];
-    const auto off = [&](const Vec3& middle_a, const Vec3& middle_b) {
-      return std::acos(std::min(1.0, std::min(d.dot(middle_a), on_b.dot(middle_b)))) + kCapRoundoff;
-    };
-    const double off_node = off(na.normal, nb.normal),
-                 off_stretch = off(InnerMap::middle(cell_a), InnerMap::middle(cell_b));
+    const double off_node = off(d, on_b, na.normal, nb.normal),
+                 off_stretch = off(d, on_b, InnerMap::middle(cell_a), InnerMap::middle(cell_b));
     const double y0 = d.dot(g), angle = std::sqrt(s.bracket.angle2) + kPoleNormal;
     double falls = (g - y0 * d).norm();
     falls +=

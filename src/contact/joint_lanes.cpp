@@ -262,7 +262,7 @@ unsigned follow_joints(unsigned asked, double enough, JointLanes* pairs) {
         (width <= tolerance) &
         (bracket.angle2 * pairs->size <= larger<Wide>(tolerance, kRoundoff * pairs->size)) &
         ((pairs->reach <= kUnequalSizes * pairs->size) |
-         (turn_allowance(bracket.angle2, pairs->reach) <= tolerance));
+         (turn_error(bracket.angle2, pairs->reach) <= tolerance));
 
     // The step spent on a second-order update of points and normal.
     const V of_a = turned_normal(a.normal, a.at, bend_a, step.metric_a, step.au, step.av),

@@ -121,13 +121,12 @@ NURBS_INLINE Normal outward(const JetLanes& j, const SurfacePoint& at, double si
   const double shorter = std::min(lu, lv);
   // Towards a pole a tangent fades; across a narrow strip it is short all along, and its limit says nothing.
   const bool fades = n.polar && j.at(Slot::kSuv).squaredNorm() > kFading * shorter;
-  if (shorter < kNearPole * kNearPole * std::max(lu, lv) && !fades)
-    n.noise = kTangentNoise * size / std::sqrt(shorter);
   if (fades) {
     const Vec3 suv = j.at(Slot::kSuv);
     n.direction = lu < lv ? suv.cross(sv) : su.cross(suv);
     if ((lu < lv ? at.v : at.u) >= 0.5) n.direction = -n.direction;
-  } else if (const double area2 = n.direction.squaredNorm(); area2 <= lost_area2(lu + lv, size)) {
+  } else if (const double area2 = n.direction.squaredNorm();
+             shorter < kNearPole * kNearPole * std::max(lu, lv) || area2 <= lost_area2(lu + lv, size)) {
     n.noise =
         area2 > 0 ? std::min(kNoNormal, kTangentNoise * size * std::sqrt((lu + lv) / area2)) : kNoNormal;
   }
@@ -182,7 +181,7 @@ NURBS_INLINE bool refine(const PairFrame& pair, JointSolution& s, const Forms& a
 // before the second.
 bool close_enough(const Bracket& bracket, double tolerance, double size, double reach) {
   return bracket.width() <= tolerance && bracket.angle2 * size <= std::max(tolerance, kRoundoff * size) &&
-         (reach <= kUnequalSizes * size || turn_allowance(bracket.angle2, reach) <= tolerance);
+         (reach <= kUnequalSizes * size || turn_error(bracket.angle2, reach) <= tolerance);
 }
 
 // What local maxima of both bodies may lack of their supports.

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "contact/local_bend.h"
 
@@ -25,10 +26,10 @@ constexpr double kNarrowArc = 0.02;     // rad: points with less are let go
 // e of a point, with y of it along d.
 struct RingPoint {
   double y, length, azimuth;
-  double inner;  // half the arc at the ring's inner end
+  double half;  // of the arc that it has all over the ring
 };
 
-struct Arc {
+struct Arc {  // or ring
   double from, to;
 };
 
@@ -36,7 +37,7 @@ class Rings {
  public:
   Rings(const PairFrame& pair, const CappedMinimum& m, const CapBalls& balls)
       : pair_(pair), m_(m), narrowest_(std::cos(balls.valid)) {
-    const double both = balls.radius_a + balls.radius_b, share = both > m.level ? m.level / both : 1;
+    const double both = balls.sum(), share = both > m.level ? m.level / both : 1;
     radius_a_ = share * balls.radius_a;
     radius_b_ = share * balls.radius_b;
     level_ = std::max(0.0, m.level - radius_a_ - radius_b_) + 8 * kRoundoff * pair.reach;
@@ -48,7 +49,7 @@ class Rings {
   }
 
   double widen(double proven, double wanted, int most, int* spent) {
-    if (!(wanted > kLeastRatio * proven && level_ < kFlattest * bend_.least)) return proven;
+    if (!(level_ < kFlattest * bend_.least)) return proven;
     const Promise valley = promise(1 / bend_.least);
     const double points = 0.5 * M_PI * (1 / valley.arc + 1 / promise(1 / bend_.most).arc);
     if (points * std::log(wanted / proven) > kForeseen * (most - *spent) * std::log(valley.ratio))
@@ -76,44 +77,50 @@ class Rings {
 
   // As far as the ring from an angle is covered, `to` at most; no further than that where it can't be.
   double close_ring(double from, double to, double points, int most, int* spent) {
-    drop(from);
+    ring_ = {from, from};
+    take_arcs();
+    count_ = static_cast<int>(
+        std::remove_if(point_, point_ + count_, [](const RingPoint& p) { return p.half < kNarrowArc; }) -
+        point_);
+    ring_.to = to;
+    take_arcs();
     int left = static_cast<int>(points) + kPatience;
-    double gap, last = kFarAway;
-    while (find_gap(to, &gap)) {
+    double gap, last = std::numeric_limits<double>::quiet_NaN();
+    while (find_gap(&gap)) {
       if (left-- == 0) {
         to = std::sqrt(from * to);
         left = kPatience;
         if (!(to > kLeastRatio * from)) return from;
+        ring_.to = to;
+        take_arcs();
         continue;
       }
       if (*spent >= most || count_ == kMostPoints) return from;
       ++*spent;
       // Where the last one did not go where it should have, W is another there.
-      ask(gap, from, to, std::abs(std::remainder(gap - last, 2 * M_PI)) < kSameGap);
+      ask(gap, std::abs(std::remainder(gap - last, 2 * M_PI)) < kSameGap);
       last = gap;
     }
     return to;
   }
 
-  double half_arc(const RingPoint& p, double angle) const {
-    const double c = (level_ - p.y * std::cos(angle)) / (p.length * std::sin(angle));
-    return c < 1 ? std::acos(std::max(0.0, c)) - kArcRoundoff : 0;
+  // Half the lesser of the arcs at the ring's ends.
+  double half_arc(const RingPoint& p) const {
+    double c = 0;
+    for (const double angle : {ring_.from, ring_.to})
+      c = std::max(c, (level_ - p.y * std::cos(angle)) / (p.length * std::sin(angle)));
+    return c < 1 ? std::acos(c) - kArcRoundoff : 0;
   }
-
-  // Points that are of no use from an angle on.
-  void drop(double angle) {
-    for (int k = 0; k < count_; ++k) point_[k].inner = half_arc(point_[k], angle);
-    count_ = static_cast<int>(
-        std::remove_if(point_, point_ + count_, [](const RingPoint& p) { return p.inner < kNarrowArc; }) -
-        point_);
+  void take_arcs() {
+    for (int k = 0; k < count_; ++k) point_[k].half = half_arc(point_[k]);
   }
 
   // The middle of the widest gap that the points' arcs leave; false where there is none.
-  bool find_gap(double to, double* middle) const {
+  bool find_gap(double* middle) const {
     Arc arc[kMostPoints];
     int arcs = 0;
     for (int k = 0; k < count_; ++k) {
-      const double half = std::min(point_[k].inner, half_arc(point_[k], to));
+      const double half = point_[k].half;
       if (!(half > 0)) continue;
       const Arc made{point_[k].azimuth - half, point_[k].azimuth + half};
       int at = arcs++;
@@ -139,14 +146,15 @@ class Rings {
 
   // A point with e at an azimuth, as W at the minimum has it, or `there` the supports in that direction,
   // which reach it.
-  void ask(double azimuth, double from, double to, bool there) {
+  void ask(double azimuth, bool there) {
     const Vec2 e(std::cos(azimuth), std::sin(azimuth));
-    Vec2 x = std::sqrt(from * to) * e;
+    const double middle = std::sqrt(ring_.from * ring_.to);
+    Vec2 x = middle * e;
     if (!there) {
       const Vec2 along = inverse_ * e;
       const double m = e.dot(along);
       const Promise p = promise(m);
-      x = std::min(from * (p.cosine + p.root) / m, std::sqrt(from * to) / along.norm()) * along;
+      x = std::min(ring_.from * (p.cosine + p.root) / m, middle / along.norm()) * along;
     }
     const Vec3 d = (m_.d + x[0] * m_.t + x[1] * m_.u).normalized();
     const Support a = support(*pair_.a, d, m_.on_a, pair_.scale_a, radius_a_, x.norm()),
@@ -157,7 +165,7 @@ class Rings {
     const double gt = m_.t.dot(g), gu = m_.u.dot(g);
     RingPoint p{std::min(m_.d.dot(g), level_), std::hypot(gt, gu), std::atan2(gu, gt), 0};
     if (!(p.length > 0)) return;
-    p.inner = half_arc(p, from);
+    p.half = half_arc(p);
     point_[count_++] = p;
   }
 
@@ -176,6 +184,7 @@ class Rings {
   Extremes bend_{0, 0};  // of W less the balls'
   double valley_;        // azimuth of the lesser
   Mat2 inverse_ = Mat2::Zero();
+  Arc ring_{0, 0};  // angles from d
   RingPoint point_[kMostPoints];
   int count_ = 0;
 };
@@ -184,7 +193,9 @@ class Rings {
 
 double widen_cap(const PairFrame& pair, const CappedMinimum& minimum, const CapBalls& balls, double proven,
                  double wanted, int most, int* spent) {
-  return Rings(pair, minimum, balls).widen(proven, std::min(wanted, balls.valid), most, spent);
+  wanted = std::min(wanted, balls.valid);
+  return wanted > kLeastRatio * proven ? Rings(pair, minimum, balls).widen(proven, wanted, most, spent)
+                                       : proven;
 }
 
 }  // namespace nurbs

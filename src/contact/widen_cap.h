@@ -19,6 +19,7 @@ struct CappedMinimum {
 struct CapBalls {
   double radius_a = 0, radius_b = 0;
   double valid = M_PI;
+  double sum() const { return radius_a + radius_b; }
 };
 
 // The angle about the minimum, up to `wanted`, within which p is proven to be at least the level, given that

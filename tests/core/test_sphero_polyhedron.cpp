@@ -182,8 +182,6 @@ TEST(BallHull, of_tapered_capsules) {
     EXPECT_TRUE(other->ball_hull.centres.empty()) << other->name;
 }
 
-// Against supports that know nothing of balls: the overlap along the normal is the one found, and no
-// direction of thousands, nor the best of them refined, has less.
 // A ball and a point: the cone's tip is a ball of no radius.
 TEST(BallHull, of_a_ball_and_a_tip) {
   const Body body = tapered(1, 0, 2.5);
@@ -199,6 +197,8 @@ TEST(BallHull, of_a_ball_and_a_tip) {
   EXPECT_TRUE(make_shape("cone", revolve(cone))->ball_hull.centres.empty());
 }
 
+// Against supports that know nothing of balls: the overlap along the normal is the one found, and no
+// direction of thousands, nor the best of them refined, has less.
 TEST(BallHull, contacts_of_two_are_least_overlaps) {
   Random random(8);
   const std::vector<Body> bodies = {tapered(1, 0.5, 1.5),
