@@ -13,6 +13,8 @@
 namespace nurbs {
 namespace {
 
+constexpr int kMostOutside = 500;  // halvings of a patch that may lie outside a ball
+
 // The field num / den over a rectangle.
 struct Field : SquaredDistance {
   double upper = 0;  // largest ratio of coefficients: bounds the field since den > 0
@@ -136,6 +138,24 @@ double bound_off_unit_sphere(const BezierPatch& patch) {
   for (size_t k = 0; k < square.num.size(); ++k)
     most = std::max(most, std::abs(square.num[k]) / square.den[k]);
   return most;
+}
+
+bool lies_outside_unit_ball(const BezierPatch& patch, double slack) {
+  Field whole{squared_distance(patch, 1)};
+  for (double& c : whole.num) c = -c;
+  update_upper(whole);
+  std::vector<Field> open{std::move(whole)};
+  for (int split = 0; !open.empty(); ++split) {
+    Field worst = std::move(open.back());
+    open.pop_back();
+    if (worst.upper <= slack) continue;
+    if (split == kMostOutside || corner_value(worst) > slack) return false;
+    const bool in_u = bends_more_in_u(worst);
+    auto [f, g] = halve(std::move(worst), in_u);
+    open.push_back(std::move(f));
+    open.push_back(std::move(g));
+  }
+  return true;
 }
 
 Vec3 bilinear_normal(const BezierPatch& patch) {

@@ -16,6 +16,8 @@ struct SquaredDistance {
 SquaredDistance squared_distance(const BezierPatch& patch, double less = 0);
 // ||x|^2 - 1| is at most this on a patch.
 double bound_off_unit_sphere(const BezierPatch& patch);
+// Whether 1 - |x|^2 is proven to be at most `slack` on a patch, by halving; false where that takes too long.
+bool lies_outside_unit_ball(const BezierPatch& patch, double slack);
 
 // Unit normal of the plane nearest to a bilinear patch, along S_u x S_v: in the middle or at a corner, as a
 // needle's long sides are all but parallel, of which round-off leaves little.

@@ -183,6 +183,7 @@ struct Shape {
   ProfileRadii profile_radii;           // of that
   SpheroPolyhedron core;                // hull of points, and a ball, that the body is, if it is one
   BallHull ball_hull;                   // of a few balls, that the body is, if it is one
+  BallHull inner_balls;                 // or holds, parts of whose surface are the body's
   std::vector<RoundEdges> round_edges;  // none of bodies of revolution
   EdgeCurves edge_curves;               // of sharp edges
   FlatFeatures flats;                   // faces, creases and ruled lines; empty for round bodies

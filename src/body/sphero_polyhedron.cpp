@@ -21,6 +21,8 @@ constexpr double kSameWeight = 1e-13;  // relative
 constexpr double kSamePoint = 1e-12;   // of the bounding radius: of corners
 constexpr double kTwoNormals = 1e-3;   // rad: closer ones give no radius
 constexpr int kHullSamples = 9;        // per patch and parameter
+constexpr double kInside = 1e-12;      // of a ball's radius, that it may lie outside
+constexpr int kMoves = 40;             // halvings of how far a ball may be moved
 constexpr double kMostOff = 1e-12;     // of the bounding radius: supports of the balls' hull and the body's
 
 struct Sample {
@@ -32,10 +34,14 @@ Sample sample(const BezierPatch& patch, double u, double v) {
   return {jet.s, jet.su.cross(jet.sv).normalized()};
 }
 
-// How far the squared distance of a patch's points from a centre is from radius^2, at most, over that.
-double off_ball(BezierPatch patch, const Vec3& centre, double radius) {
+BezierPatch seen_from(BezierPatch patch, const Vec3& centre, double radius) {
   for (Vec4& p : patch.points) p.head<3>() = (p.head<3>() - p[3] * centre) / radius;
-  return bound_off_unit_sphere(patch);
+  return patch;
+}
+
+// How far the squared distance of a patch's points from a centre is from radius^2, at most, over that.
+double off_ball(const BezierPatch& patch, const Vec3& centre, double radius) {
+  return bound_off_unit_sphere(seen_from(patch, centre, radius));
 }
 
 // The radius that two normals across a patch give, those that differ most, away from edges that may be
@@ -124,7 +130,42 @@ class Finder {
     return out.error <= kMostError * shape_.bounding_radius ? out : BallHull();
   }
 
+  BallHull inner() {
+    BallHull on, out;
+    all_balls(&on);  // as many as there is room for
+    for (size_t k = 0; k < on.centres.size() && out.centres.size() < kMostBalls; ++k) {
+      const Vec3& centre = on.centres[k];
+      const double radius = on.radii[k];
+      if (!is_inside(centre, radius)) continue;
+      const auto take = [&](const Vec3& at) {
+        out.centres.push_back(at);
+        out.radii.push_back(radius);
+      };
+      take(centre);
+      out.error = std::max(out.error, (kOnBall + kInside) * shape_.bounding_radius);
+      for (const double sign : {-1.0, 1.0}) {
+        if (!shape_.revolution.found || out.centres.size() == kMostBalls) break;
+        const Vec3 along = sign * shape_.revolution.axis;
+        const auto holds = [&](double way) { return is_inside(centre + way * along, radius); };
+        double inside = 0, outside = 2 * shape_.bounding_radius;
+        if (!holds(kNearCentre * radius)) continue;
+        for (int step = 0; step < kMoves; ++step) {
+          const double way = 0.5 * (inside + outside);
+          (holds(way) ? inside : outside) = way;
+        }
+        take(centre + inside * along);
+      }
+    }
+    return out;
+  }
+
  private:
+  bool is_inside(const Vec3& centre, double radius) const {
+    return std::all_of(shape_.patches.begin(), shape_.patches.end(), [&](const BezierPatch& patch) {
+      return lies_outside_unit_ball(seen_from(patch, centre, radius), kInside);
+    });
+  }
+
   // But for tips of cones, if those are let be.
   bool is_smooth(bool with_tips = false) const {
     for (const auto& links : shape_.links)
@@ -274,6 +315,10 @@ SpheroPolyhedron find_sphero_polyhedron(const Shape& shape) {
 
 BallHull find_ball_hull(const Shape& shape) {
   return shape.joint_slack > 0 || shape.bilinear ? BallHull() : Finder(shape).hull();
+}
+
+BallHull find_inner_balls(const Shape& shape) {
+  return shape.joint_slack > 0 || shape.bilinear ? BallHull() : Finder(shape).inner();
 }
 
 }  // namespace nurbs

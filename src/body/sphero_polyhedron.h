@@ -67,4 +67,10 @@ constexpr int kMostBalls = 4;
 // is the body is measured besides, at samples of every patch's points and normals.
 BallHull find_ball_hull(const Shape& shape);
 
+// Balls inside the body, proven, that parts of its surface lie on (eggs, bullets, balls cut flat), and the
+// same moved along the axis of a body of revolution as far as they stay inside: the body's support is no less
+// than their hull's, and equal where it is on one of those parts. None of bodies that are such a hull. Of
+// hulls that are found already nothing is asked. 1 to 20 ms where there are any.
+BallHull find_inner_balls(const Shape& shape);
+
 }  // namespace nurbs

@@ -10,6 +10,7 @@ namespace nurbs {
 namespace {
 
 constexpr int kMostTerms = kMostBalls * kMostBalls;
+constexpr double kSameTerm = 0.05;   // of the tolerance: two that count as one
 constexpr double kSameLine = 1e-15;  // sine between differences of centres: circles that are parallel
 constexpr double kTouching = 1e-13;  // of a length of 1: circles that touch
 
@@ -18,10 +19,12 @@ struct Balls {
   Vec3 centre[kMostBalls];  // pair frame
   double radius[kMostBalls];
   double error = 0;
+  bool whole = true;  // the body is their hull
 
   Balls(const Shape& shape, double scale, const Mat3& turn, const Vec3& offset) {
     const SpheroPolyhedron& core = shape.core;
-    const BallHull& hull = shape.ball_hull;
+    whole = core.found() || shape.ball_hull.found();
+    const BallHull& hull = whole ? shape.ball_hull : shape.inner_balls;
     const std::vector<Vec3>& centres = core.found() ? core.points : hull.centres;
     if (centres.size() > kMostBalls) return;
     count = static_cast<int>(centres.size());
@@ -35,22 +38,28 @@ struct Balls {
 
 class BallHullSearch {
  public:
-  BallHullSearch(const PairFrame& pair, const Balls& a, const Balls& b)
+  BallHullSearch(const PairFrame& pair, const Balls& a, const Balls& b, double tolerance)
       : a_(a), b_(b), reach_(pair.reach), noise_(a.error + b.error + 16 * kRoundoff * pair.reach) {
+    double left_out = 0;
     for (int i = 0; i < a.count; ++i)
       for (int j = 0; j < b.count; ++j) {
-        term_[count_].g = a.centre[i] - b.centre[j];
-        term_[count_].radius = a.radius[i] + b.radius[j];
-        ++count_;
+        const Term made{a.centre[i] - b.centre[j], a.radius[i] + b.radius[j], i, j};
+        double apart = kFarAway;
+        for (int k = 0; k < count_; ++k)
+          apart = std::min(apart, (made.g - term_[k].g).norm() + std::abs(made.radius - term_[k].radius));
+        if (apart <= kSameTerm * tolerance)
+          left_out = std::max(left_out, apart);
+        else
+          term_[count_++] = made;
       }
+    noise_ += left_out;
   }
 
   // False where round-off leaves it open, or no balls that touch along the direction.
   bool run() {
     consider(Vec3::UnitX(), 0, 0, 0);
     for (int i = 0; i < count_; ++i) {
-      if (const double length = term_[i].g.norm(); length > kNoDirection * reach_)
-        consider(-term_[i].g / length, i, i, i);
+      if (const double length = term_[i].g.norm(); length > noise_) consider(-term_[i].g / length, i, i, i);
       for (int j = i + 1; j < count_; ++j) {
         level_of_two(i, j);
         for (int k = j + 1; k < count_; ++k)
@@ -60,16 +69,19 @@ class BallHullSearch {
     return off_ < kFarAway;
   }
 
-  void fill(const PairFrame& pair, PolytopeResult* r) const {
+  const Vec3& direction() const { return direction_; }
+  double upper() const { return -least_ + noise_; }
+
+  void fill(const PairFrame& pair, double lower, PolytopeResult* r) const {
     r->bracket.direction = direction_;
-    r->bracket.lower = -there_ - noise_;
-    r->bracket.upper = -least_ + noise_;
+    r->bracket.lower = std::min(lower, -there_ - noise_);
+    r->bracket.upper = upper();
     r->gap = -there_;
     r->converged = r->closed = true;
     r->iterations = 1;
     Vec3 a = Vec3::Zero(), b = Vec3::Zero();
     for (int n = 0; n < 3; ++n) {
-      const int i = active_[n] / b_.count, j = active_[n] % b_.count;
+      const int i = term_[active_[n]].i, j = term_[active_[n]].j;
       a += weights_[n] * (a_.centre[i] + a_.radius[i] * direction_);
       b += weights_[n] * (b_.centre[j] - b_.radius[j] * direction_);
     }
@@ -81,6 +93,7 @@ class BallHullSearch {
   struct Term {
     Vec3 g;
     double radius;
+    int i, j;  // whose balls'
   };
 
   double overlap(const Vec3& d) const {
@@ -105,7 +118,14 @@ class BallHullSearch {
     }
     double off = (weights[0] * x + weights[1] * y + weights[2] * z).norm();
     const auto largest = [&](int n) { return d.dot(term_[n].g) + term_[n].radius >= p - level; };
-    if (!(off < kFarAway && largest(i) && largest(j) && largest(k))) off = kFarAway;
+    if (!(off < kFarAway && largest(i) && largest(j) && largest(k))) {
+      // Of balls about one centre every direction is as good.
+      i = 0;
+      while (i < count_ && !(largest(i) && across(i).norm() <= noise_)) ++i;
+      off = i < count_ ? across(i).norm() : kFarAway;
+      weights = Vec3::UnitX();
+      j = k = i;
+    }
     if (p < least_ - level || off < off_) {
       off_ = off;
       direction_ = d;
@@ -133,7 +153,7 @@ class BallHullSearch {
     const double cosine = std::clamp(c.level / length, -1.0, 1.0), sine = std::sqrt(1 - cosine * cosine);
     Vec3 e = term_[i].g - u.dot(term_[i].g) * u;
     const double across = e.norm();
-    if (across > kNoDirection * reach_) {
+    if (across > kRoundoff * reach_) {
       e /= across;
       e = (e - u.dot(e) * u).normalized();  // what cancelled of it left it hardly square to u
     } else {
@@ -164,7 +184,8 @@ class BallHullSearch {
   }
 
   const Balls &a_, &b_;
-  const double reach_, noise_;
+  const double reach_;
+  double noise_;
   int count_ = 0;
   Term term_[kMostTerms];
   double least_ = kFarAway, there_ = kFarAway;  // overlap, and in the direction chosen
@@ -175,15 +196,24 @@ class BallHullSearch {
 
 }  // namespace
 
-bool search_ball_hulls(const PairFrame& pair, double tolerance, PolytopeResult* result) {
+bool search_ball_hulls(const PairFrame& pair, double tolerance, PolytopeResult* result, double* upper) {
+  *upper = kFarAway;
+  const auto some = [](const Shape& shape) { return shape.ball_hull.found() || shape.inner_balls.found(); };
   // Of points and a ball the polytope is.
-  if (!pair.a->ball_hull.found() && !pair.b->ball_hull.found()) return false;
+  if (!some(*pair.a) && !some(*pair.b)) return false;
   const Balls a(*pair.a, pair.scale_a, Mat3::Identity(), Vec3::Zero()),
       b(*pair.b, pair.scale_b, pair.turn, pair.offset);
   if (a.count == 0 || b.count == 0) return false;
-  BallHullSearch search(pair, a, b);
+  BallHullSearch search(pair, a, b, tolerance);
   if (!(search.width() <= 0.5 * tolerance) || !search.run()) return false;
-  search.fill(pair, result);
+  *upper = search.upper();
+  double lower = kFarAway;
+  if (!(a.whole && b.whole)) {
+    const auto [on_a, on_b] = hull_supports(pair, search.direction(), nullptr, nullptr, tolerance);
+    lower = -pair.overlap_along(search.direction(), on_a.upper, on_b.upper);
+    if (!(search.upper() - lower <= tolerance)) return false;
+  }
+  search.fill(pair, lower, result);
   return true;
 }
 

@@ -1,4 +1,4 @@
-// Two hulls of a few balls each: the least overlap in closed form.
+// Two hulls of a few balls each: the least overlap in closed form; and bodies that hold such hulls.
 #pragma once
 
 #include "contact/polytope.h"
@@ -17,6 +17,9 @@ namespace nurbs {
 // which three are equal to round-off is one of balls moved by as much, and the least value moves by no more.
 // False where round-off leaves that open, and where the shapes are off such hulls by more than a share of the
 // tolerance. p may be least over a whole region of directions, as of balls about one centre.
-bool search_ball_hulls(const PairFrame& pair, double tolerance, PolytopeResult* result);
+// Of bodies that such a hull is part of (Shape::inner_balls) p is no less than that: the search closes where
+// their supports along its direction have no more, as along those of the balls' parts. *upper, if no
+// +infinity then, bounds the gap above.
+bool search_ball_hulls(const PairFrame& pair, double tolerance, PolytopeResult* result, double* upper);
 
 }  // namespace nurbs

@@ -190,6 +190,9 @@ class Search {
     return 0;
   }
 
+  // What is known of the gap besides.
+  void bound(double upper) { upper_ = upper; }
+
   // Builds the first solid: along the seed and three directions that make a tetrahedron with it; while those
   // are flat, across the triangle (or the line) that they make.
   bool start(const Vec3& seed) {
@@ -887,7 +890,8 @@ PolytopeResult solve_polytope(const PairFrame& pair, const Vec3& seed, double to
   // its vertices moved at random by far more than round-off and far less than the tolerance (Barber, Dobkin &
   // Huhdanpaa 1996, section 4: joggled input); the upper bound allows for it.
   PolytopeResult best;
-  if (search_segments(pair, tolerance, &best) || search_ball_hulls(pair, tolerance, &best) ||
+  double upper = kFarAway;
+  if (search_segments(pair, tolerance, &best) || search_ball_hulls(pair, tolerance, &best, &upper) ||
       search_segment_in_ellipsoid(pair, seed, tolerance, &best))
     return best;
   Vec3 from = seed;
@@ -896,6 +900,7 @@ PolytopeResult solve_polytope(const PairFrame& pair, const Vec3& seed, double to
   for (int attempt = 0; attempt < kHullAttempts; ++attempt) {
     const double joggle = attempt > 0 ? std::min(kJoggle * pair.reach, 0.05 * tolerance) : 0.0;
     Search search(pair, tolerance, joggle, points);
+    search.bound(upper);
     if (attempt % 2 == 1) search.let_be();
     const bool started = search.start(from), flat = search.only_points() && !started;
     if (flat || attempt + 1 == kPointAttempts) points = false;

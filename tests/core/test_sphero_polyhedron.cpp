@@ -214,7 +214,7 @@ TEST(BallHull, contacts_of_two_are_least_overlaps) {
     Particle a{&sa, 1, Vec3::Zero(), random.turn()},
         b{&sb, random.log_uniform(0.3, 3), Vec3::Zero(), random.turn()};
     if (k % 4 == 1) b.q = a.q;
-    const double off[] = {0, 1e-8, 1e-5, 1e-3, 0.03, 0.3, 1, 2.2};
+    const double off[] = {k % 16 < 8 ? 0 : 1e-11, 1e-8, 1e-5, 1e-3, 0.03, 0.3, 1, 2.2};
     // About the big balls' centres, or the centres of mass.
     const Vec3 centre_a = k % 3 ? Vec3(a.q * -sa.mass.center) : Vec3(Vec3::Zero()),
                centre_b = k % 3 ? Vec3(b.scale * (b.q * -sb.mass.center)) : Vec3(Vec3::Zero());
@@ -233,6 +233,93 @@ TEST(BallHull, contacts_of_two_are_least_overlaps) {
     EXPECT_NEAR(r.normal.dot(r.point_a), find_hull_support(sa, a.q.conjugate() * r.normal).h, 1e-9 * size)
         << k;
     EXPECT_LT((r.point_b - r.point_a).cross(r.normal).norm(), 1e-5 * size) << k << " gap " << r.gap;
+  }
+}
+
+// Half a ball on a cylinder with a flat base, the ball's centre at the origin.
+Body bullet(double length) {
+  const double c = std::sqrt(0.5);
+  return make_shape("bullet", revolve({{Vec2(0, -length), Vec2::Zero(), Vec2(1, -length), 0},
+                                       {Vec2(1, -length), Vec2::Zero(), Vec2(1, 0), 0},
+                                       {Vec2(1, 0), Vec2(1, 1), Vec2(0, 1), c}}));
+}
+// A ball cut flat below.
+Body cut_ball(double depth) {
+  const double rim = std::sqrt(1 - depth * depth), turn = std::asin(depth) + 0.5 * M_PI,
+               c = std::cos(0.25 * turn);
+  const auto at = [&](double angle, double r) { return Vec2(r * std::cos(angle), r * std::sin(angle)); };
+  const double low = -std::asin(depth), middle = low + 0.5 * turn;
+  return make_shape("cut ball",
+                    revolve({{Vec2(0, -depth), Vec2::Zero(), Vec2(rim, -depth), 0},
+                             {Vec2(rim, -depth), at(0.5 * (low + middle), 1 / c), at(middle, 1), c},
+                             {at(middle, 1), at(0.5 * (middle + 0.5 * M_PI), 1 / c), Vec2(0, 1), c}}));
+}
+
+// Of bodies whose surface is a ball's in part; along the cylinder they may be moved.
+TEST(InnerBalls, are_found_and_lie_inside) {
+  const struct {
+    Body body;
+    std::vector<double> heights;  // of the centres, of balls of radius 1
+  } cases[] = {{bullet(2), {0, -1}},
+               {bullet(0.5), {}},  // the ball reaches through the base
+               {make_shape("egg", egg(1, 1, 1.4)), {0}},
+               {make_shape("egg, pointed below", egg(1, 1.4, 1)), {0}},
+               {make_shape("flat egg", egg(1, 1, 0.9)), {}},
+               {cut_ball(0.8), {}},
+               {make_shape("ellipsoid", exact_ellipsoid({1, 0.8, 0.6})), {}},
+               {make_shape("pebble", pebble()), {}}};
+  for (const auto& [body, heights] : cases) {
+    const BallHull& balls = body->inner_balls;
+    ASSERT_EQ(balls.centres.size(), heights.size()) << body->name;
+    for (size_t k = 0; k < heights.size(); ++k) {
+      EXPECT_NEAR(balls.radii[k], 1, 1e-12) << body->name;
+      EXPECT_LT((balls.centres[k] + body->mass.center - Vec3(0, 0, heights[k])).norm(), 1e-6) << body->name;
+      for (const Vec3& d : test::spiral(2000))
+        EXPECT_GE(find_hull_support(*body, d).h, d.dot(balls.centres[k]) + balls.radii[k] - balls.error);
+    }
+  }
+  // Hulls of balls are known as such.
+  EXPECT_FALSE(tapered(1, 0.5, 1.5)->inner_balls.found());
+  EXPECT_FALSE(make_shape("capsule", capsule(0.5, 2))->inner_balls.found());
+}
+
+// Parts of balls about one centre: p(d) is the same over regions of directions, which no hull of points
+// closes.
+TEST(InnerBalls, contacts_about_one_centre_are_least_overlaps) {
+  Random random(9);
+  const std::vector<Body> bodies = {bullet(2), make_shape("egg", egg(1, 1, 1.4)), tapered(1, 0, 2.5),
+                                    make_shape("ball", exact_ellipsoid({1, 1, 1}))};
+  const auto centre = [](const Shape& s) {
+    return s.inner_balls.found() ? s.inner_balls.centres[0]
+           : s.ball_hull.found() ? s.ball_hull.centres[s.ball_hull.radii[0] > 0 ? 0 : 1]
+                                 : Vec3(Vec3::Zero());
+  };
+  const std::vector<Vec3> spiral = test::spiral(1500);
+  for (int k = 0; k < 320; ++k) {
+    const Shape &sa = *bodies[k % 4], &sb = *bodies[k / 4 % 4];
+    Particle a{&sa, 1, Vec3::Zero(), random.turn()},
+        b{&sb, random.log_uniform(0.3, 3), Vec3::Zero(), random.turn()};
+    const bool eggs = k % 4 == 1 || k / 4 % 4 == 1;
+    const double off[] = {0, 1e-14, 1e-12, 1e-11, 1e-10, 1e-8, 1e-5, 1e-3, 0.03, 0.3};
+    const int which = k / 16 % (eggs ? 4 : 10);
+    b.x = a.q * centre(sa) - b.scale * (b.q * centre(sb)) +
+          off[which] * std::min(1.0, b.scale) * random.direction();
+    double memory[kPairMemorySize] = {0};
+    const ContactResult r = find_contact(a, b, ContactSettings(), memory);
+    ASSERT_EQ(r.status, Status::converged) << k;
+    const auto overlap = [&](const Vec3& d) {
+      return find_hull_support(sa, a.q.conjugate() * d).h +
+             b.scale * find_hull_support(sb, b.q.conjugate() * -d).h - d.dot(b.x);
+    };
+    const double size = std::min(sa.bounding_radius, b.scale * sb.bounding_radius);
+    EXPECT_NEAR(overlap(r.normal), -r.gap, 1e-9 * size) << k;
+    EXPECT_GE(test::least_overlap(overlap, spiral, test::Compass(), random), -r.gap - 1e-9 * size) << k;
+    if (off[which] < 1e-9) {
+      EXPECT_NEAR(-r.gap, 1 + b.scale, 2e-9 * size) << k;
+    }
+    EXPECT_NEAR(r.normal.dot(r.point_b - r.point_a), r.gap, 1e-12 * size + 1e-12) << k;
+    EXPECT_NEAR(r.normal.dot(r.point_a), find_hull_support(sa, a.q.conjugate() * r.normal).h, 1e-9 * size)
+        << k;
   }
 }
 
