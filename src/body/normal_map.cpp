@@ -27,25 +27,46 @@ void paint(const Vec3& center, double angle, double radius, NormalMap& map) {
               [&](int cell) { map.radius[cell] = std::max(map.radius[cell], value); });
 }
 
-// The same for caps of any width, over all cells.
+// The same for caps of any width. By blocks of cells, of which those are passed over that a cap does not
+// reach or that have as large radii already.
 class WidePainter {
  public:
   void paint(const Vec3& center, double angle, double radius, NormalMap& map) {
     const float value = std::nextafter(static_cast<float>(radius), std::numeric_limits<float>::infinity());
     if (x_.empty()) set_up(map.cells);
     const double reach = angle + 1.5 / map.cells;  // half a cell's diagonal, at most
-    const double cosine = reach < M_PI ? std::cos(reach) - kRoundoff : -2;
-    float* const to = map.radius.data();
-    const double *x = x_.data(), *y = y_.data(), *z = z_.data(), *norm = norm_.data();
-    const double a = center[0], b = center[1], c = center[2];
-    const size_t count = x_.size();
-    for (size_t k = 0; k < count; ++k) {  // a loop for vectors
-      const float painted = a * x[k] + b * y[k] + c * z[k] >= cosine * norm[k] ? value : 0;
-      to[k] = std::max(to[k], painted);
-    }
+    const auto cosine_of = [](double wide) { return wide < M_PI ? std::cos(wide) - kRoundoff : -2; };
+    const double cosine = cosine_of(reach), cosine_of_block = cosine_of(reach + widest_);
+    for (Block& block : blocks_)
+      if (block.least < value && center.dot(block.middle) >= cosine_of_block)
+        paint(block, center, cosine, value, map);
   }
 
  private:
+  static constexpr int kSide = 8;  // cells along a block's
+  static_assert(kNormalCells % kSide == 0, "faces are whole blocks");
+  struct Block {
+    int first;         // cell
+    Vec3 middle;       // unit
+    float least = -1;  // radius of its cells, when it was painted last
+  };
+
+  void paint(Block& block, const Vec3& center, double cosine, float value, NormalMap& map) const {
+    const double a = center[0], b = center[1], c = center[2];
+    block.least = value;
+    for (int row = 0; row < kSide; ++row) {
+      const int first = block.first + row * map.cells;
+      const double *x = x_.data() + first, *y = y_.data() + first, *z = z_.data() + first,
+                   *norm = norm_.data() + first;
+      float* const to = map.radius.data() + first;
+      for (int k = 0; k < kSide; ++k) {  // a loop for vectors
+        const float painted = a * x[k] + b * y[k] + c * z[k] >= cosine * norm[k] ? value : 0;
+        to[k] = std::max(to[k], painted);
+      }
+      for (int k = 0; k < kSide; ++k) block.least = std::min(block.least, to[k]);
+    }
+  }
+
   void set_up(int cells) {
     for (int face = 0; face < 6; ++face)
       for (int i = 0; i < cells; ++i)
@@ -56,9 +77,24 @@ class WidePainter {
           z_.push_back(d[2]);
           norm_.push_back(d.norm());
         }
+    for (int face = 0; face < 6; ++face)
+      for (int i = 0; i < cells; i += kSide)
+        for (int j = 0; j < cells; j += kSide) {
+          const auto corner = [&](int di, int dj) {
+            return cell_middle(face, i + di, j + dj, cells).normalized();
+          };
+          const int last = kSide - 1;
+          Block block{(face * cells + i) * cells + j,
+                      (corner(0, 0) + corner(0, last) + corner(last, 0) + corner(last, last)).normalized()};
+          for (const Vec3& d : {corner(0, 0), corner(0, last), corner(last, 0), corner(last, last)})
+            widest_ = std::max(widest_, angle_between(d, block.middle));
+          blocks_.push_back(block);
+        }
   }
 
   std::vector<double> x_, y_, z_, norm_;  // through the cells' middles
+  std::vector<Block> blocks_;
+  double widest_ = 0;  // rad, of a block's cells' middles from its own
 };
 
 class Painter {

@@ -11,6 +11,7 @@
 
 #include "body/bounds.h"
 #include "body/rounding.h"
+#include "nurbs/bernstein.h"
 #include "nurbs/tolerances.h"
 
 namespace nurbs {
@@ -134,12 +135,6 @@ bool is_bulging_cylinder(const BezierPatch& patch, double size) {
   // over the sides' lengths, over the arc's curvature, below 0.
   const double twist = 4 * off / line.norm(), arc = rise / normal.norm();
   return twist * twist <= kCurvatureNoise / size * arc;
-}
-
-double binomial(int n, int k) {
-  double out = 1;
-  for (int i = 1; i <= k; ++i) out = out * (n - k + i) / i;
-  return out;
 }
 
 // A Bernstein net of two parameters, and the products of such nets.

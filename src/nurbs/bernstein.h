@@ -10,7 +10,23 @@
 
 namespace nurbs {
 
+// From Pascal's triangle up to a row, which polynomials of joints seldom exceed. 1 ns.
+constexpr int kPascalRows = 64;
+class Pascal {
+ public:
+  Pascal() {
+    for (int n = 0; n < kPascalRows; ++n)
+      for (int k = 0; k <= n; ++k) row_[n][k] = k == 0 || k == n ? 1 : row_[n - 1][k - 1] + row_[n - 1][k];
+  }
+  double operator()(int n, int k) const { return row_[n][k]; }
+
+ private:
+  double row_[kPascalRows][kPascalRows];
+};
+inline const Pascal kPascal;
+
 inline double binomial(int n, int k) {
+  if (n < kPascalRows) return kPascal(n, k);
   double b = 1;
   for (int i = 1; i <= k; ++i) b = b * (n - k + i) / i;
   return b;
@@ -26,14 +42,19 @@ template <class A, class B, class Times>
 auto multiply(const Bernstein<A>& a, const Bernstein<B>& b, const Times& times) {
   using T = decltype(times(a[0], b[0]));
   const int p = static_cast<int>(a.size()) - 1, q = static_cast<int>(b.size()) - 1;
-  Bernstein<T> product(p + q + 1);
-  std::vector<bool> set(p + q + 1, false);
-  for (int i = 0; i <= p; ++i)
-    for (int k = 0; k <= q; ++k) {
-      const T term = binomial(p, i) * binomial(q, k) / binomial(p + q, i + k) * times(a[i], b[k]);
-      product[i + k] = set[i + k] ? T(product[i + k] + term) : term;
-      set[i + k] = true;
-    }
+  // C(p,i) a_i and C(q,k) b_k are the coefficients of powers, but for a factor of both.
+  Bernstein<A> x(a);
+  Bernstein<B> y(b);
+  for (int i = 0; i <= p; ++i) x[i] *= binomial(p, i);
+  for (int k = 0; k <= q; ++k) y[k] *= binomial(q, k);
+  Bernstein<T> product;
+  product.reserve(p + q + 1);
+  for (int m = 0; m <= p + q; ++m) {
+    int i = m > q ? m - q : 0;
+    T sum = times(x[i], y[m - i]);
+    for (++i; i <= p && i <= m; ++i) sum += times(x[i], y[m - i]);
+    product.push_back(sum * (1 / binomial(p + q, m)));
+  }
   return product;
 }
 
