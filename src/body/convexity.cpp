@@ -6,6 +6,7 @@
 #include <cmath>
 #include <functional>
 #include <limits>
+#include <utility>
 
 #include "body/joints.h"
 #include "body/local_form.h"
@@ -15,6 +16,9 @@
 namespace nurbs {
 namespace {
 
+constexpr int kExcessRounds = 12;     // halvings of the step: grooves are narrower than that
+constexpr size_t kClimbs = 4;         // places that are refined
+constexpr size_t kInwardPlaces = 8;   // of cells that bend inward, of either kind
 constexpr double kLeastDepth = 0.25;  // of the excess: a shallow dent's is about that at least
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
@@ -209,9 +213,9 @@ class Probe {
 using Measure = std::function<double(const SurfacePoint&)>;
 
 // Largest value of `measure` near `at` within its patch, by compass search; moves `at` there.
-double climb(const Measure& measure, SurfacePoint& at, double step) {
+double climb(const Measure& measure, SurfacePoint& at, double step, int rounds) {
   double best = measure(at);
-  for (int round = 0; round < kPlaceRounds; ++round, step *= 0.5) {
+  for (int round = 0; round < rounds; ++round, step *= 0.5) {
     const SurfacePoint from = at;
     for (int side = 0; side < 4; ++side) {
       SurfacePoint next = from;
@@ -224,15 +228,18 @@ double climb(const Measure& measure, SurfacePoint& at, double step) {
   return best;
 }
 
-// The worst of `places` by `measure`, refined.
-double worst_of(const Measure& measure, const std::vector<SurfacePoint>& places, double step,
+// The worst of `places` by `measure`: the few where it is most, refined.
+double worst_of(const Measure& measure, const std::vector<SurfacePoint>& places, double step, int rounds,
                 SurfacePoint& where) {
-  double best = -kInfinity;
-  for (const SurfacePoint& place : places) {
-    const double value = measure(place);
-    if (value > best) best = value, where = place;
-  }
-  return climb(measure, where, step);
+  std::vector<std::pair<double, SurfacePoint>> found;
+  for (const SurfacePoint& place : places) found.push_back({measure(place), place});
+  const auto first = [](const auto& a, const auto& b) { return a.first > b.first; };
+  std::stable_sort(found.begin(), found.end(), first);
+  if (found.size() > kClimbs) found.resize(kClimbs);
+  for (auto& [value, place] : found) value = climb(measure, place, step, rounds);
+  const auto& [value, place] = *std::min_element(found.begin(), found.end(), first);
+  where = place;
+  return value;
 }
 
 // A sample of every patch that bends inward by more than its own round-off, if by less than what is noise
@@ -260,17 +267,32 @@ const SurfaceSample& most_concave(const std::vector<SurfaceSample>& samples) {
                            [&](const SurfaceSample& a, const SurfaceSample& b) { return bend(a) < bend(b); });
 }
 
-// The leaf that bends inward most for its size, if any does by more than round-off.
-const Leaf* most_concave(const std::vector<Leaf>& leaves, double size) {
-  const Leaf* worst = nullptr;
-  double most = 0;
-  for (const Leaf& leaf : leaves) {
-    const CellBounds& b = leaf.bounds;
-    if (b.convex || !(b.seen_curvature < -kCurvatureNoise / size)) continue;
-    const double bend = b.seen_curvature * leaf.cell.du * leaf.cell.dv;
-    if (bend < most) most = bend, worst = &leaf;
+// Of the cells that bend inward by more than round-off two of every patch, the worst of all first: that which
+// does most, and that which does for its size.
+std::vector<SurfacePoint> places_inward(const SurfaceBounds& bounds, double size) {
+  struct Worst {
+    double bend = 0;
+    SurfacePoint where;
+  };
+  std::vector<std::array<Worst, 2>> of(bounds.even.size());
+  for (const auto* leaves : {&bounds.leaves, &bounds.hollows})
+    for (const Leaf& leaf : *leaves) {
+      const CellBounds& b = leaf.bounds;
+      if (b.convex || !(b.seen_curvature < -kCurvatureNoise / size)) continue;
+      const double bend[] = {b.seen_curvature * leaf.cell.du * leaf.cell.dv, b.seen_curvature};
+      for (int k = 0; k < 2; ++k)
+        if (Worst& worst = of[leaf.cell.patch][k]; bend[k] < worst.bend) worst = {bend[k], leaf.middle};
+    }
+  std::vector<SurfacePoint> places;
+  for (int k = 0; k < 2; ++k) {
+    std::vector<Worst> worst;
+    for (const auto& w : of)
+      if (w[k].bend < 0) worst.push_back(w[k]);
+    std::sort(worst.begin(), worst.end(), [](const Worst& a, const Worst& b) { return a.bend < b.bend; });
+    if (worst.size() > kInwardPlaces) worst.resize(kInwardPlaces);
+    for (const Worst& w : worst) places.push_back(w.where);
   }
-  return worst;
+  return places;
 }
 
 // Some points of every sharp edge that bends outward: faces that are ruled show no curvature there.
@@ -290,14 +312,14 @@ std::vector<SurfacePoint> places_on_dented_edges(const PatchLinks& links,
 
 }  // namespace
 
-Dent find_dent(const Shape& shape, const std::vector<SurfaceSample>& samples, const std::vector<Leaf>& leaves,
+Dent find_dent(const Shape& shape, const std::vector<SurfaceSample>& samples, const SurfaceBounds& bounds,
                const KinkSummary& kinks) {
   const double size = shape.bounding_radius;
-  const Leaf* inward = most_concave(leaves, size);
+  const std::vector<SurfacePoint> inward = places_inward(bounds, size);
   const SurfaceSample& concave = most_concave(samples);
   std::vector<SurfacePoint> places = places_on_dented_edges(shape.links, shape.patches);
   const std::vector<SurfacePoint> hollow = places_hardly_hollow(samples, size);
-  const bool clearly = inward || !places.empty() || kinks.concave > kNoKink ||
+  const bool clearly = !inward.empty() || !places.empty() || kinks.concave > kNoKink ||
                        concave.k_min < -kCurvatureNoise / size,
              suspect = clearly || !hollow.empty();
   const Clouds clouds = choose(samples, suspect ? kPairsIfDented : kPairsIfConvex);
@@ -319,13 +341,13 @@ Dent find_dent(const Shape& shape, const std::vector<SurfaceSample>& samples, co
   const Probe probe(shape, starts, step);
   SurfacePoint where;
   places.insert(places.end(), {clouds.places[highest], clouds.places[deepest], concave.where, kinks.deepest});
-  if (inward) places.push_back(inward->middle);
+  places.insert(places.end(), inward.begin(), inward.end());
   const auto excess_at = [&](const auto& at) { return probe.excess(at); };
-  const double twisted = hollow.empty() ? 0 : worst_of(excess_at, hollow, step, where),
-               seen = std::max(twisted, worst_of(excess_at, places, step, where));
+  const double twisted = hollow.empty() ? 0 : worst_of(excess_at, hollow, step, kExcessRounds, where),
+               seen = std::max(twisted, worst_of(excess_at, places, step, kExcessRounds, where));
   if (!clearly && seen <= kNoDent * size) return dent;
-  dent.excess = std::max(dent.excess, seen);
-  double found = worst_of([&](const auto& at) { return probe.depth(at); }, places, step, where);
+  double found = worst_of([&](const auto& at) { return probe.depth(at); }, places, step, kPlaceRounds, where);
+  dent.excess = std::max({dent.excess, seen, probe.excess(where)});
   // Of walls hardly twisted the hull's plane is lost in round-off.
   found = std::max(found, kLeastDepth * twisted);
   if (found > dent.depth) {

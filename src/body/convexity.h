@@ -20,12 +20,12 @@ struct Dent {
 };
 
 // Deepest dent of a shape whose patches, links and bounding radius are done. A closed surface with no
-// negative curvature and no concave kink is convex (van Heijenoort 1952): `leaves` and `kinks` prove it, and
-// what is left to see is whether it passes through itself, by comparing the samples with each other's tangent
-// planes. Where a leaf shows negative curvature or a kink closes, the worst places, of leaves and samples,
-// are measured with the support mapping and refined: depth and excess are then right to a few per cent for
-// dents wider than the sample spacing; they are measured, not proven. About 2 ms, up to 100 ms with dents.
-Dent find_dent(const Shape& shape, const std::vector<SurfaceSample>& samples, const std::vector<Leaf>& leaves,
+// negative curvature and no concave kink is convex (van Heijenoort 1952): the leaves of `bounds` and `kinks`
+// prove it, and what is left to see is whether it passes through itself, by comparing the samples with each
+// other's tangent planes. Where a cell shows negative curvature or a kink closes, the worst places, of cells
+// and samples, are measured with the support mapping and refined: depth and excess are then right to a few
+// per cent; they are measured, not proven. About 2 ms, up to 100 ms with dents.
+Dent find_dent(const Shape& shape, const std::vector<SurfaceSample>& samples, const SurfaceBounds& bounds,
                const KinkSummary& kinks);
 
 }  // namespace nurbs

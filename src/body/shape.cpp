@@ -274,7 +274,7 @@ void measure(Draft& draft) {
   s.proofs = summarise(s, bounds, kinks);
   s.patch_curvature = bounds.radii;
   s.curvature = add_kinks(s.patch_curvature, kinks);
-  const Dent dent = find_dent(s, sample_surface(s.patches), bounds.leaves, kinks);
+  const Dent dent = find_dent(s, sample_surface(s.patches), bounds, kinks);
   judge_dent(draft, dent);
   s.concavity = dent.depth;
   s.support_excess = dent.excess + s.joint_slack;

@@ -8,6 +8,7 @@
 #include <limits>
 #include <numeric>
 #include <optional>
+#include <queue>
 
 #include "body/bounds.h"
 #include "body/rounding.h"
@@ -26,6 +27,12 @@ constexpr double kLocalTightness = 0.4;  // of a cell's least radius and the one
 constexpr int kLocalCellsPerPatch = 100;
 // The same for the proof of convexity, where no hollow is seen: without it every support is doubted.
 constexpr int kConvexBudget = 6;
+// And for hollows that the middles of large cells miss.
+constexpr int kHuntCells = 2000, kHuntCellsPerPatch = 100;
+constexpr double kLeastHollow = 1e-12;  // share of the bounding radius that one may be deep
+constexpr double kUnknownBend = 1e6;    // over that radius: of cells without bounds
+constexpr double kAsHollow = 2;         // times what is seen: a cell hides nothing worse
+constexpr double kAlike = 0.99;         // of what halves hide
 // Halvings of a patch on a ball: parameters that still fold are a sliver's.
 constexpr int kDeepestOnBall = 10;
 constexpr double kPlaneTilt = 1e-6;     // rad: more of a tilt within a patch is no plane's round-off
@@ -471,12 +478,14 @@ class Bounder {
         leaf.bounds = enclose(out_.even[p], leaf.cell, wanted(leaf.cell));
         on_ball(balls_[p], out_.even[p], &leaf);
         leaf.bounds.min_radius = std::max(leaf.bounds.min_radius, round);
-        if (bulging) leaf.bounds.least_curvature = std::max(leaf.bounds.least_curvature, 0.0);
+        if (bulging || !(known < kFarAway))
+          leaf.bounds.least_curvature = std::max(leaf.bounds.least_curvature, 0.0);
         ++out_.cells;
         see(leaf);
         out_.leaves.push_back(leaf);
       }
     }
+    std::vector<Leaf> first = out_.leaves;
     const int most = kMostCells + kMostCellsPerPatch * patches_;
     if (!sphere_)
       halve_while([this](const Leaf& leaf) { return least_loose(leaf); }, kLeastRadiusBudget * most);
@@ -484,6 +493,7 @@ class Bounder {
     halve_while([this](const Leaf& leaf) { return leaf.depth < kDeepestUnproven && unproven(leaf); }, base);
     halve_while([this](const Leaf& leaf) { return !hollow_ && unproven(leaf) && bent(leaf); },
                 kConvexBudget * most);
+    if (!sphere_) hunt_hollows(std::move(first), out_.cells + kHuntCells + kHuntCellsPerPatch * patches_);
     halve_while([this](const Leaf& leaf) { return radii_loose(leaf); },
                 std::max(most, out_.cells + most / 2));
     if (!wanted_.rate) return leave();
@@ -547,7 +557,7 @@ class Bounder {
     const CellBounds& b = leaf.bounds;
     if (b.seen_min > 0) out_.seen_min = std::min(out_.seen_min, b.seen_min);
     if (b.seen_curvature > 0) out_.seen_max = std::max(out_.seen_max, b.seen_max);
-    if (b.seen_curvature < -kCurvatureNoise / shape_.bounding_radius) hollow_ = true;
+    hollow_ |= is_hollow(leaf);
     see_rate(leaf);
   }
 
@@ -575,6 +585,73 @@ class Bounder {
   bool unproven(const Leaf& leaf) const {
     const CellBounds& b = leaf.bounds;
     return !left_as_sliver(leaf) && !b.convex && b.seen_curvature > 0 && !is_flat(b, shape_.bounding_radius);
+  }
+
+  // How deep a hollow may be, roughly, over the bounding radius, that a leaf has not shown; 0 if none.
+  double hidden_hollow(const Leaf& leaf) const {
+    const CellBounds& b = leaf.bounds;
+    const double size = shape_.bounding_radius;
+    if (b.convex || is_flat(b, size) || left_as_sliver(leaf) || leaf.depth >= kDeepestUnproven) return 0;
+    const double known = std::max(0.0, -kAsHollow * b.seen_curvature),
+                 bend = b.regular ? size * (-b.least_curvature - known) : kInfinity;
+    return std::max(0.0, bend < kInfinity ? bend : kUnknownBend) * leaf.cell.du * leaf.cell.dv;
+  }
+
+  // Goes down into the cells that may hide most, one after the other, `cells` allowing, to where they may
+  // hide most: into grooves much narrower than their patch. From its first cells, `leaves`, of patches that
+  // the leaves left open: those may have been cut into strips by then.
+  void hunt_hollows(std::vector<Leaf> leaves, int cells) {
+    std::vector<char> left(patches_, false);
+    for (const Leaf& leaf : out_.leaves) left[leaf.cell.patch] |= hidden_hollow(leaf) > kLeastHollow;
+    using Entry = std::pair<double, int>;
+    std::priority_queue<Entry> open;
+    const auto enter = [&](int k) {
+      const double hidden = hidden_hollow(leaves[k]);
+      if (hidden > kLeastHollow) open.push({hidden, k});
+    };
+    const auto note = [&](const Leaf& leaf) {
+      if (is_hollow(leaf)) out_.hollows.push_back(leaf);
+    };
+    for (int k = 0; k < static_cast<int>(leaves.size()); ++k)
+      if (left[leaves[k].cell.patch]) {
+        note(leaves[k]);
+        enter(k);
+      }
+    while (!open.empty() && out_.cells < cells) {
+      int k = open.top().second;
+      open.pop();
+      while (hidden_hollow(leaves[k]) > kLeastHollow) {
+        leaves.push_back(halve_either_way(&leaves[k]));
+        const int other = static_cast<int>(leaves.size()) - 1;
+        const bool turn = hidden_hollow(leaves[other]) > hidden_hollow(leaves[k]);
+        note(leaves[k]);
+        note(leaves[other]);
+        enter(turn ? k : other);
+        if (turn) k = other;
+      }
+    }
+  }
+  bool is_hollow(const Leaf& leaf) const {
+    return leaf.bounds.seen_curvature < -kCurvatureNoise / shape_.bounding_radius;
+  }
+
+  // The way that leaves less hidden, or across. *leaf becomes the first half; returns the second.
+  Leaf halve_either_way(Leaf* leaf) {
+    const int p = leaf->cell.patch;
+    Halves ways[2];
+    std::vector<Splitting> splittings;
+    for (const bool in_u : {false, true})
+      splittings.push_back({&out_.even[p], wanted(leaf->cell), &balls_[p], leaf, in_u, &ways[in_u]});
+    halve_all(splittings, &out_.cells);
+    const auto hidden = [&](const Halves& h) { return hidden_hollow(h.first) + hidden_hollow(h.second); };
+    const double along[] = {hidden(ways[0]), hidden(ways[1])};
+    const bool alike = std::min(along[0], along[1]) > kAlike * std::max(along[0], along[1]);
+    auto& [a, b] = ways[alike ? leaf->cell.du >= leaf->cell.dv : along[1] < along[0]];
+    a.depth = b.depth = leaf->depth + 1;
+    see(a);
+    see(b);
+    *leaf = a;
+    return b;
   }
 
   bool bent(const Leaf& leaf) const { return leaf.bounds.seen_curvature > kBent / shape_.bounding_radius; }
@@ -607,13 +684,18 @@ class Bounder {
     return b.rate > kRateTightness * std::max(b.seen_rate, floor);
   }
 
+  void set_middle(Leaf* leaf) const {
+    const Cell& c = leaf->cell;
+    const auto& [u, v] = changes_[c.patch];
+    leaf->middle = {c.patch, u.at(c.u0 + 0.5 * c.du), v.at(c.v0 + 0.5 * c.dv)};
+  }
+
   void finish() {
     CurvatureBounds& radii = out_.radii;
     radii.min_radius = kInfinity;
+    for (Leaf& leaf : out_.hollows) set_middle(&leaf);
     for (Leaf& leaf : out_.leaves) {
-      const Cell& c = leaf.cell;
-      const auto& [u, v] = changes_[c.patch];
-      leaf.middle = {c.patch, u.at(c.u0 + 0.5 * c.du), v.at(c.v0 + 0.5 * c.dv)};
+      set_middle(&leaf);
       radii.min_radius = std::min(radii.min_radius, leaf.bounds.min_radius);
       radii.max_radius = std::max(radii.max_radius, leaf.bounds.max_radius);
     }

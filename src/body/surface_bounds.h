@@ -21,6 +21,7 @@ struct SurfaceBounds {
   CurvatureBounds radii;         // inside the patches, proven
   std::vector<PatchRate> rates;  // per patch, proven
   std::vector<Leaf> leaves;      // cover every patch
+  std::vector<Leaf> hollows;     // cells seen to bend inward, in patches of which leaves are left open
   // The patches with weights as even as a change of parameters makes them (u = r s / (1 + (r - 1) s)), which
   // is what cells are cut from: uneven weights make uneven parameters, and more cells.
   std::vector<BezierPatch> even;
