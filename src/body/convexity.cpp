@@ -212,31 +212,39 @@ class Probe {
 
 using Measure = std::function<double(const SurfacePoint&)>;
 
+// How often the step is halved, and what a better place is better by, relatively.
+struct Climb {
+  int rounds;
+  double gain;
+};
+constexpr Climb kToExcess = {12, 0};  // grooves are narrower than samples lie apart
+constexpr Climb kToDepth = {kPlaceRounds, kDepthTolerance};
+
 // Largest value of `measure` near `at` within its patch, by compass search; moves `at` there.
-double climb(const Measure& measure, SurfacePoint& at, double step, int rounds) {
+double climb(const Measure& measure, SurfacePoint& at, double step, const Climb& how) {
   double best = measure(at);
-  for (int round = 0; round < rounds; ++round, step *= 0.5) {
+  for (int round = 0; round < how.rounds; ++round, step *= 0.5) {
     const SurfacePoint from = at;
     for (int side = 0; side < 4; ++side) {
       SurfacePoint next = from;
       double& moved = side < 2 ? next.u : next.v;
       moved = std::clamp(moved + (side % 2 ? step : -step), 0.0, 1.0);
       const double value = measure(next);
-      if (value > best) best = value, at = next;
+      if (value > (1 + how.gain) * best) best = value, at = next;
     }
   }
   return best;
 }
 
 // The worst of `places` by `measure`: the few where it is most, refined.
-double worst_of(const Measure& measure, const std::vector<SurfacePoint>& places, double step, int rounds,
-                SurfacePoint& where) {
+double worst_of(const Measure& measure, const std::vector<SurfacePoint>& places, double step,
+                const Climb& how, SurfacePoint& where) {
   std::vector<std::pair<double, SurfacePoint>> found;
   for (const SurfacePoint& place : places) found.push_back({measure(place), place});
   const auto first = [](const auto& a, const auto& b) { return a.first > b.first; };
   std::stable_sort(found.begin(), found.end(), first);
   if (found.size() > kClimbs) found.resize(kClimbs);
-  for (auto& [value, place] : found) value = climb(measure, place, step, rounds);
+  for (auto& [value, place] : found) value = climb(measure, place, step, how);
   const auto& [value, place] = *std::min_element(found.begin(), found.end(), first);
   where = place;
   return value;
@@ -320,7 +328,7 @@ Dent find_dent(const Shape& shape, const std::vector<SurfaceSample>& samples, co
   std::vector<SurfacePoint> places = places_on_dented_edges(shape.links, shape.patches);
   const std::vector<SurfacePoint> hollow = places_hardly_hollow(samples, size);
   const bool clearly = !inward.empty() || !places.empty() || kinks.concave > kNoKink ||
-                       concave.k_min < -kCurvatureNoise / size,
+                       kinks.excess > kNoDent * size || concave.k_min < -kCurvatureNoise / size,
              suspect = clearly || !hollow.empty();
   const Clouds clouds = choose(samples, suspect ? kPairsIfDented : kPairsIfConvex);
   const std::vector<double> support = sampled_support(clouds), depth = sampled_depth(clouds, support);
@@ -343,10 +351,10 @@ Dent find_dent(const Shape& shape, const std::vector<SurfaceSample>& samples, co
   places.insert(places.end(), {clouds.places[highest], clouds.places[deepest], concave.where, kinks.deepest});
   places.insert(places.end(), inward.begin(), inward.end());
   const auto excess_at = [&](const auto& at) { return probe.excess(at); };
-  const double twisted = hollow.empty() ? 0 : worst_of(excess_at, hollow, step, kExcessRounds, where),
-               seen = std::max(twisted, worst_of(excess_at, places, step, kExcessRounds, where));
+  const double twisted = hollow.empty() ? 0 : worst_of(excess_at, hollow, step, kToExcess, where),
+               seen = std::max(twisted, worst_of(excess_at, places, step, kToExcess, where));
   if (!clearly && seen <= kNoDent * size) return dent;
-  double found = worst_of([&](const auto& at) { return probe.depth(at); }, places, step, kPlaceRounds, where);
+  double found = worst_of([&](const auto& at) { return probe.depth(at); }, places, step, kToDepth, where);
   dent.excess = std::max({dent.excess, seen, probe.excess(where)});
   // Of walls hardly twisted the hull's plane is lost in round-off.
   found = std::max(found, kLeastDepth * twisted);

@@ -18,7 +18,8 @@ namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
-constexpr double kFanStep = 0.02;  // rad, between caps painted across a joint
+constexpr double kFanStep = 0.02;    // rad, between caps painted across a joint
+constexpr double kNoValley = 1e-12;  // rad: normals' round-off
 
 // Raises the radius of every cell that a cap of directions may touch.
 void paint(const Vec3& center, double angle, double radius, NormalMap& map) {
@@ -119,7 +120,8 @@ class Painter {
     for (size_t p = 0; p < shape_.patches.size(); ++p)
       for (int e = 0; e < 4; ++e) {
         const EdgeLink& link = shape_.links[p][e];
-        if (link.gap > gap || (link.kinked() && may_close(static_cast<int>(p), e)))
+        if (link.gap > gap ||
+            (link.kinked() ? may_close(static_cast<int>(p), e) : may_hide_valley(static_cast<int>(p), e)))
           paint_joint(static_cast<int>(p), e);
         else if (shape_.dented() && link.kinked() && link.patch >= 0)
           for (const EdgePart& part : find_dented_parts(shape_.patches[p], e))
@@ -132,6 +134,20 @@ class Painter {
     const EdgeLink& link = shape_.links[patch][edge];
     if (link.patch < 0 || link.kink < -kNoKink) return true;
     return bound_kink(shape_.patches[patch], edge, shape_.patches[link.patch], link).closing > kNoKink;
+  }
+
+  // Whether a joint that is no kink closes by enough to count where the body is as flat as it is there: it
+  // hides the square of its angle, over the curvature.
+  bool may_hide_valley(int patch, int edge) const {
+    const EdgeLink& link = shape_.links[patch][edge];
+    if (link.collapsed || link.patch < 0) return false;
+    const double angle = bound_kink(shape_.patches[patch], edge, shape_.patches[link.patch], link).closing;
+    if (!(angle > kNoValley)) return false;
+    double radius = 0;
+    for (int k = 0; k <= kNormalJointSamples; ++k)
+      radius = std::max(
+          radius, map_.radius_at(sides(patch, edge, static_cast<double>(k) / kNormalJointSamples).here));
+    return 0.5 * angle * angle * radius > kRoundoff * shape_.bounding_radius;
   }
 
   // The normals of a joint's two sides at its parameter t, the same twice where there is one.
