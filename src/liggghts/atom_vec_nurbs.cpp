@@ -256,6 +256,7 @@ void AtomVecNurbs::init() {
   if (shapes_.count() == 0) nurbs_host::fail_all(FLERR, lmp, "atom_style nurbs has no shapes");
   nurbs_host::check_host(lmp, &told_);
   follow_set_commands();
+  check_ids();
   if (const std::string bad = check_all_owned(); !bad.empty()) nurbs_host::fail_one(lmp, bad);
   warn_default_density();
   warn_wider_than_box();
@@ -362,8 +363,8 @@ void AtomVecNurbs::follow_set_command(int i) {
   const nurbs::Shape& body = *shape(i);
   if (!close(radius_[i], scale_[i] * body.bounding_radius)) scale_[i] = radius_[i] / body.bounding_radius;
   const double volume = body.mass.volume * scale_[i] * scale_[i] * scale_[i];
-  const bool mass_was_set =
-      !close(rmass_[i], density_[i] * volume) && !close(rmass_[i], sphere_mass(radius_[i], density_[i]));
+  const bool mass_was_set = std::isnormal(volume) && !close(rmass_[i], density_[i] * volume) &&
+                            !close(rmass_[i], sphere_mass(radius_[i], density_[i]));
   if (mass_was_set) density_[i] = rmass_[i] / volume;
   update_size(i);
 }
@@ -374,8 +375,47 @@ std::string AtomVecNurbs::check_all_owned() const {
     const std::string who = "Atom " + std::to_string(tag_[i]) + ": ";
     if (!(scale_[i] > 0)) return who + "scale " + nurbs_host::show(scale_[i]) + " must be > 0";
     if (!(density_[i] > 0)) return who + "density " + nurbs_host::show(density_[i]) + " must be > 0";
+    if (const std::string bad = check_size(i); !bad.empty()) return who + bad;
   }
   return "";
+}
+
+std::string AtomVecNurbs::check_size(int i) const {
+  if (std::isnormal(rmass_[i]) && std::isnormal(radius_[i])) return "";
+  return "scale " + nurbs_host::show(scale_[i]) + " and density " + nurbs_host::show(density_[i]) +
+         " give a mass of " + nurbs_host::show(rmass_[i]) + ", which must be above " +
+         nurbs_host::show(std::numeric_limits<double>::min()) + " and finite";
+}
+
+// Each id is looked at on the rank of its remainder. The smallest there twice is named.
+void AtomVecNurbs::check_ids() {
+  int mine = data_read_, any = 0;
+  MPI_Allreduce(&mine, &any, 1, MPI_INT, MPI_MAX, world);
+  data_read_ = false;
+  if (any == 0) return;
+  const int ranks = comm->nprocs;
+  std::vector<std::vector<int>> to(ranks);
+  for (int i = 0; i < atom->nlocal; ++i) to[tag_[i] % ranks].push_back(tag_[i]);
+  std::vector<int> sent(ranks), got(ranks), from(ranks), at(ranks), all;
+  for (int r = 0; r < ranks; ++r) {
+    from[r] = static_cast<int>(all.size());
+    sent[r] = static_cast<int>(to[r].size());
+    all.insert(all.end(), to[r].begin(), to[r].end());
+  }
+  MPI_Alltoall(sent.data(), 1, MPI_INT, got.data(), 1, MPI_INT, world);
+  int count = 0;
+  for (int r = 0; r < ranks; ++r) at[r] = count, count += got[r];
+  std::vector<int> here(count);
+  MPI_Alltoallv(all.data(), sent.data(), from.data(), MPI_INT, here.data(), got.data(), at.data(), MPI_INT,
+                world);
+  std::sort(here.begin(), here.end());
+  const auto twice = std::adjacent_find(here.begin(), here.end());
+  int least = twice == here.end() ? std::numeric_limits<int>::max() : *twice, first = 0;
+  MPI_Allreduce(&least, &first, 1, MPI_INT, MPI_MIN, world);
+  if (first < std::numeric_limits<int>::max())
+    nurbs_host::fail_all(FLERR, lmp,
+                         "Atom " + std::to_string(first) + " in the Atoms section: id " +
+                             std::to_string(first) + " is there twice; ids must differ");
 }
 
 void AtomVecNurbs::grow(int n) {
@@ -700,20 +740,27 @@ void AtomVecNurbs::data_atom(double* coord, tagint image, char** values) {
   for (int k = 0; k < 4; ++k)
     if (!parse(values[8 + k], q[k]))
       fail(std::string("quaternion component ") + values[8 + k] + " must be a number");
-  if (!(to_quat(q).norm() > 0)) fail("quaternion 0 0 0 0 must have a length > 0");
+  const double length = to_quat(q).coeffs().stableNorm();
+  if (!(length > 0)) fail("quaternion 0 0 0 0 must have a length > 0");
+  if (!std::isnormal(to_quat(q).squaredNorm()))
+    for (double& component : q) component /= length;
 
   const int i = append_atom(type, coord, image);
   tag_[i] = tag;
   set_body(i, shape_number, scale, density, to_quat(q));
+  if (const std::string bad = check_size(i); !bad.empty()) fail(bad);
+  data_read_ = true;
 }
 
 // values: vx vy vz wx wy wz
 void AtomVecNurbs::data_vel(int i, char** values) {
+  const std::string who = "Atom " + std::to_string(tag_[i]) + " in the Velocities section: ";
   for (int k = 0; k < 6; ++k) {
     double& target = k < 3 ? v_[i][k] : omega_[i][k - 3];
-    if (!parse(values[k], target))
-      nurbs_host::fail_one(lmp, "Atom " + std::to_string(tag_[i]) +
-                                    " in the Velocities section: " + values[k] + " must be a number");
+    if (values[k] == nullptr)  // the host counts the first line's, and takes what lacks from the next line
+      nurbs_host::fail_one(lmp, who + std::to_string(k) +
+                                    " values behind the id; there must be 6 in its line and the line before");
+    if (!parse(values[k], target)) nurbs_host::fail_one(lmp, who + values[k] + " must be a number");
   }
 }
 

@@ -83,6 +83,9 @@ class AtomVecNurbs : public AtomVec {
   // A fix insert/* begins: the bodies that are there now, ghosts too, are what insertion_site() holds, until
   // the next begins. `radius`: the largest that will be inserted. Collective.
   void begin_insertion(double radius);
+  // Whether that fix gives an orientation itself, so that templates draw none.
+  void orient_insertion(bool given) { insertion_oriented_ = given; }
+  bool insertion_oriented() const { return insertion_oriented_; }
   nurbs::InsertionSite& insertion_site();
 
   void settings(int narg, char** arg) override;
@@ -124,6 +127,10 @@ class AtomVecNurbs : public AtomVec {
   bigint memory_usage() override;
 
  private:
+  // What keeps particle i from having a mass and a size; empty when nothing does.
+  std::string check_size(int i) const;
+  // Ends the run where two particles of a data file have one id.
+  void check_ids();
   // What a periodic image adds to a ghost's position and (under fix deform) velocity.
   struct ImageShift {
     nurbs::Vec3 x = nurbs::Vec3::Zero();
@@ -185,6 +192,8 @@ class AtomVecNurbs : public AtomVec {
   std::vector<SpinRecord> spin_;
 
   bool density_wanted_ = false;
+  bool insertion_oriented_ = false;
+  bool data_read_ = false;      // atoms of a data file: their ids are to be looked at
   std::set<std::string> told_;  // warnings of host_rules.h
   nurbs::RotorBatch batch_;     // scratch
 };

@@ -4,6 +4,7 @@
 #include <mpi.h>
 
 #include <cmath>
+#include <cstring>
 #include <string>
 #include <vector>
 
@@ -11,6 +12,7 @@
 #include "fix_property_atom.h"
 #include "liggghts/atom_vec_nurbs.h"
 #include "liggghts/host_error.h"
+#include "liggghts/nurbs_contact.h"
 #include "modify.h"
 #include "region.h"
 #include "update.h"
@@ -36,7 +38,43 @@ void require_room(LAMMPS* lmp, const Fix& fix, const Region& region, double radi
                                nurbs_host::show(2 * radius));
 }
 
+// Whether `orientation constant QW QX QY QZ` is among the words; the four are checked.
+bool is_oriented(LAMMPS* lmp, const Fix& fix, int narg, char** arg) {
+  if (!holds_nurbs(*lmp->atom)) return false;
+  for (int k = 3; k + 1 < narg; ++k)
+    if (std::strcmp(arg[k], "orientation") == 0 && std::strcmp(arg[k + 1], "constant") == 0) {
+      if (k + 5 >= narg)
+        nurbs_host::fail_all(FLERR, lmp,
+                             nurbs_host::name_of(fix) + ": orientation constant needs QW QX QY QZ");
+      nurbs_host::parse_quaternion(lmp, nurbs_host::name_of(fix) + ": orientation", arg + k + 2);
+      return true;
+    }
+  return false;
+}
+
+// Before the particles of this step are drawn.
+void tell_oriented(const Atom& atom, bool oriented) {
+  if (auto* bodies = dynamic_cast<AtomVecNurbs*>(atom.avec)) bodies->orient_insertion(oriented);
+}
+
 }  // namespace
+
+FixInsertPackNurbs::FixInsertPackNurbs(LAMMPS* lmp, int narg, char** arg)
+    : FixInsertPack(lmp, narg, arg), oriented_(is_oriented(lmp, *this, narg, arg)) {}
+FixInsertRateRegionNurbs::FixInsertRateRegionNurbs(LAMMPS* lmp, int narg, char** arg)
+    : FixInsertRateRegion(lmp, narg, arg), oriented_(is_oriented(lmp, *this, narg, arg)) {}
+FixInsertStreamNurbs::FixInsertStreamNurbs(LAMMPS* lmp, int narg, char** arg)
+    : FixInsertStream(lmp, narg, arg), oriented_(is_oriented(lmp, *this, narg, arg)) {}
+
+int FixInsertRateRegionNurbs::calc_ninsert_this() {
+  tell_oriented(*atom, oriented_);
+  return FixInsertRateRegion::calc_ninsert_this();
+}
+
+int FixInsertStreamNurbs::calc_ninsert_this() {
+  tell_oriented(*atom, oriented_);
+  return FixInsertStream::calc_ninsert_this();
+}
 
 void FixInsertPackNurbs::calc_insertion_properties() {
   if (ins_region != nullptr && all_in_flag && holds_nurbs(*atom))
@@ -52,6 +90,7 @@ void FixInsertRateRegionNurbs::calc_insertion_properties() {
 
 // For the time of the host's count every radius is that of the sphere of the particle's volume.
 int FixInsertPackNurbs::calc_ninsert_this() {
+  tell_oriented(*atom, oriented_);
   if (!holds_nurbs(*atom)) return FixInsertPack::calc_ninsert_this();
   std::vector<double> radius(atom->nlocal + 1);
   for (int i = 0; i < atom->nlocal; ++i)

@@ -1,7 +1,8 @@
-// fix insert/pack and insert/rate/region: the host's own under the host's names, with two things changed for
+// fix insert/pack and insert/rate/region: the host's own under the host's names, with some things changed for
 // NURBS particles. `volumefraction_region` counts the volume of those that are in the region already, where
 // the host would count their bounding spheres'; and a region that holds none of them is refused in one line.
-// fix insert/stream refuses to go on after a restart where the host would release its particles too late.
+// fix insert/stream refuses to go on after a restart where the host would release its particles too late. And
+// `orientation constant Q` is an orientation: it takes the place of a template's random one.
 #ifdef FIX_CLASS
 
 FixStyle(insert/pack,FixInsertPackNurbs) FixStyle(insert/rate/region,FixInsertRateRegionNurbs)
@@ -20,25 +21,38 @@ namespace LAMMPS_NS {
 
 class FixInsertPackNurbs : public FixInsertPack {
  public:
-  FixInsertPackNurbs(LAMMPS* lmp, int narg, char** arg) : FixInsertPack(lmp, narg, arg) {}
+  FixInsertPackNurbs(LAMMPS* lmp, int narg, char** arg);
 
  protected:
   void calc_insertion_properties() override;
   int calc_ninsert_this() override;
+
+ private:
+  bool oriented_;  // `orientation constant` is given
 };
 
 class FixInsertRateRegionNurbs : public FixInsertRateRegion {
  public:
-  FixInsertRateRegionNurbs(LAMMPS* lmp, int narg, char** arg) : FixInsertRateRegion(lmp, narg, arg) {}
+  FixInsertRateRegionNurbs(LAMMPS* lmp, int narg, char** arg);
 
  protected:
   void calc_insertion_properties() override;
+  int calc_ninsert_this() override;
+
+ private:
+  bool oriented_;
 };
 
 class FixInsertStreamNurbs : public FixInsertStream {
  public:
-  FixInsertStreamNurbs(LAMMPS* lmp, int narg, char** arg) : FixInsertStream(lmp, narg, arg) {}
+  FixInsertStreamNurbs(LAMMPS* lmp, int narg, char** arg);
   void post_create() override;
+
+ protected:
+  int calc_ninsert_this() override;
+
+ private:
+  bool oriented_;
 };
 
 }  // namespace LAMMPS_NS

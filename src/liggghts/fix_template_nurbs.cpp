@@ -145,9 +145,11 @@ void ParticleToInsertNurbs::scale_pti(double factor) {
   set_body(factor * scale_, density_ins);
 }
 
-// The orientation a fix insert/* asks for turns the template's.
+// The orientation a fix insert/* asks for turns the template's; a constant one stands for a random one.
 Quat ParticleToInsertNurbs::draw_orientation(const double* quat) const {
-  const Quat own = model_.random ? random_orientation(*random_) : model_.orientation;
+  const Quat own = !model_.random                  ? model_.orientation
+                   : bodies().insertion_oriented() ? Quat::Identity()
+                                                   : random_orientation(*random_);
   return (Quat(quat[0], quat[1], quat[2], quat[3]) * own).normalized();
 }
 

@@ -247,6 +247,7 @@ void FixWallNurbs::init() {
   ledger_ = nurbs_host::wants_ledger(lmp);
   if (models_) models_->init();
   warn_periodic();
+  warn_mesh_types();
   warn_time_step();
 }
 
@@ -279,6 +280,20 @@ void FixWallNurbs::warn_periodic() {
   nurbs_host::warn(FLERR, lmp,
                    name_of(*this) + ": the plane's normal lies along periodic" + directions +
                        "; particles that leave there come back behind the plane; use boundary f");
+}
+
+// In the host's own walls the mesh's type is the material.
+void FixWallNurbs::warn_mesh_types() {
+  if (!models_ || types_warned_) return;
+  for (const Mesh& mesh : meshes_) {
+    const int own = mesh.fix->atomTypeWall();
+    if (own == wall_type_) continue;
+    types_warned_ = true;
+    nurbs_host::warn(FLERR, lmp,
+                     name_of(*this) + ": fix " + mesh.id + " has type " + std::to_string(own) +
+                         ", but this wall's type " + std::to_string(wall_type_) +
+                         " is its material; give meshes of another material a wall of their own");
+  }
 }
 
 void FixWallNurbs::warn_time_step() {

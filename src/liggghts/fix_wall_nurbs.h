@@ -111,6 +111,7 @@ class FixWallNurbs : public Fix {
   double way_since(const Kept& kept) const;
   void warn_models(const class PairGranNurbs& pair);
   void warn_periodic();
+  void warn_mesh_types();
   void warn_time_step();
   void warn_deep(const char* when);
 
@@ -135,7 +136,7 @@ class FixWallNurbs : public Fix {
   nurbs::BodyRecord wall_{};
   bool ledger_ = false;
   bool was_another_kind_ = false;  // in the restart that is read
-  bool periodic_warned_ = false;
+  bool periodic_warned_ = false, types_warned_ = false;
   bigint checked_particles_ = 0;  // when deep contacts were last looked for
   std::string last_warning_, last_deep_warning_, last_model_warning_;
 };

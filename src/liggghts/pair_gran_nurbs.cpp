@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
+#include <set>
 
 #include "atom.h"
 #include "comm.h"
@@ -77,6 +78,7 @@ void PairGranNurbs::settings(int narg, char** arg) {
   require_alone();
   settings_ = nurbs_host::contacts_only();
   std::unique_ptr<nurbs_host::HostModels> models;
+  std::set<std::string> given;
   for (int k = 0; k < narg; k += 2) {
     const std::string keyword = arg[k];
     if (nurbs_host::HostModels::named_by(narg - k, arg + k)) {
@@ -90,6 +92,8 @@ void PairGranNurbs::settings(int narg, char** arg) {
                "Pair style gran/nurbs: unknown keyword " + keyword +
                    "; allowed are tolerance solver radius model");
     if (k + 1 == narg) fail_all(FLERR, lmp, "Pair style gran/nurbs: keyword " + keyword + " needs a value");
+    if (!given.insert(keyword).second)
+      fail_all(FLERR, lmp, "Pair style gran/nurbs: keyword " + keyword + " is there twice");
     const std::string value = arg[k + 1];
     if (keyword == "tolerance") {
       settings_.tolerance = nurbs_host::parse_number(lmp, "Pair style gran/nurbs: tolerance", arg[k + 1]);

@@ -598,6 +598,10 @@ TEST(Gyration, ImpossibleTensorsAreRefused) {
   EXPECT_TRUE(contains(error_of(body, g), "must not exceed the sum of the others"));
   g(0, 0) = std::numeric_limits<double>::quiet_NaN();
   EXPECT_EQ(error_of(body, g), "body: gyration must be finite");
+  g = Vec3(0.6, 0.7, 1.1).asDiagonal();  // as of mass outside the ball
+  EXPECT_TRUE(contains(error_of(body, g),
+                       "largest eigenvalue is 1.1; it must not exceed the square of the "
+                       "bounding radius, 1"));
 }
 
 }  // namespace

@@ -331,6 +331,32 @@ class BadInput(unittest.TestCase):
         self.refuse(HEADER + "read_data in.data\n", "Atom 2", "nan",
                     files=files(velocities=[VELOCITIES[0], (2, 0.0, 0.0, "nan", 0.0, 0.0, 0.0), VELOCITIES[2]]))
 
+        # A line cut short; the host counts the first alone.
+        self.refuse(HEADER + "read_data in.data\n", "Velocities section", "there must be 6", on=(1, 2),
+                    files=files(velocities=[VELOCITIES[0], VELOCITIES[1][:-1], VELOCITIES[2]]))
+        self.refuse(HEADER + "read_data in.data\n", "Velocities section", "5 values", "there must be 6", on=(1, 2),
+                    files=files(velocities=[VELOCITIES[0], VELOCITIES[1], VELOCITIES[2][:-1]]))
+
+    def test_id_there_twice(self):
+        twin = (2,) + tuple(ATOMS[0][1:5]) + tuple(x + 0.5 for x in ATOMS[0][5:8]) + tuple(ATOMS[0][8:])
+        motion = "pair_style gran/nurbs\npair_coeff * * kn 1e6 kt 1e6 mu 0.3\nfix m all nve/nurbs\nrun 0\n"
+        self.refuse(HEADER + "read_data in.data\n" + motion, "Atom 2", "id 2 is there twice", on=(1, 2, 4),
+                    files=files([ATOMS[0], ATOMS[1], twin], []))
+
+    def test_mass_out_of_range(self):
+        for scale, density in (("1e-320", 1000.0), ("1e150", 1000.0), (0.1, "1e-310")):
+            self.refuse_atom({3: scale, 4: density}, "Atom 2", "scale", "density", "give a mass of")
+        self.refuse(HEADER + "read_data in.data\nset atom 2 nurbs/scale 1e-110\nfix m all nve/nurbs\nrun 0\n",
+                    "Atom 2", "scale 1e-110", "give a mass of 0", on=(1, 2), files=files())
+
+    def test_long_quaternion_is_normalised(self):
+        atom = tuple(ATOMS[1][:8]) + (0.0, 3e200, 0.0, 4e200)
+        text = HEADER + "read_data in.data\nfix m all nve/nurbs\ncompute b all nurbs/atom qw qx qy qz\n" \
+            "dump d all custom 1 dump.txt id c_b[1] c_b[2] c_b[3] c_b[4]\nrun 0\n"
+        frame = deck.run_ok(text, files=files([ATOMS[0], atom], [])).dump("dump.txt")[-1][1]
+        at = list(frame["id"]).index(2)
+        np.testing.assert_allclose([frame[f"c_b[{k}]"][at] for k in (1, 2, 3, 4)], [0, 0.6, 0, 0.8], atol=1e-12)
+
     def test_position_that_is_no_number(self):
         self.refuse_atom({6: "nan"}, "Atom 2", "coordinate nan", "number")
 

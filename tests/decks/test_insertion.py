@@ -152,6 +152,16 @@ class WhatIsInserted(Decks):
         np.testing.assert_allclose(frame["c_body[3]"], np.sqrt(0.5), atol=1e-15)
         np.testing.assert_allclose(frame["c_body[4]"], np.sqrt(0.5), atol=1e-15)
 
+        # It stands for a random one, as which a template's goes that says nothing.
+        model = template("atom_type 1 density constant 1 shape ell scale constant 0.4")
+        for given, expected in (("constant 0 0.6 0 0.8", (0, 0.6, 0, 0.8)), ("constant 1 0 0 0", (1, 0, 0, 0))):
+            for ranks in (1, 2):
+                text = header() + model + one() + REGION + insert_pack("particles_in_region 5", "one") + OUTPUT + "run 1\n"
+                text = text.replace("maxattempt 100", "maxattempt 100 orientation " + given)
+                frame = self.run_deck(text, ranks=ranks).dump("dump.txt")[-1][1]
+                q = np.stack([frame[f"c_body[{k}]"] for k in (1, 2, 3, 4)], axis=1)
+                np.testing.assert_allclose(q, np.tile(expected, (5, 1)), atol=1e-15)
+
     def test_overlap_by_surfaces_fills_more_than_by_bounding_spheres(self):
         counts = {}
         for judge in ("exact", "sphere"):
@@ -336,6 +346,10 @@ class Refused(Decks):
             self.refuse(header() + template(words), *expected)
         self.refuse(header() + template("shape ell shape ell"), "shape is there twice", ranks=2)
         self.refuse(header() + "fix t all particletemplate/nurbs\n", "needs a seed")
+
+    def test_orientation_of_an_insertion(self):
+        insert = insert_pack("particles_in_region 5", "one").replace("maxattempt 100", "orientation constant nan 0 0 0")
+        self.refuse(header() + PLAIN + REGION + insert + "run 1\n", "Fix insert/pack", "orientation", "nan")
 
     def test_spheres(self):
         text = header() + ("fix t all particletemplate/sphere 15485863 atom_type 1 density constant 1 radius constant 0.5\n")

@@ -216,6 +216,25 @@ class Meshes(unittest.TestCase):
         self.assertLess(np.ptp(rough.thermo["ledger"]), 1e-3 * rough.thermo["led[3]"][-1])
         self.assertEqual(last(run("mesh m", before=materials + MESH, law=law, mesh=hills(), ranks=2)), last(rough))
 
+    def test_a_mesh_of_another_type_is_spoken_of(self):
+        """In the host's walls the mesh's type is the material; here the wall's is."""
+        materials = "\n".join(f"fix {name} all property/global {words}" for name, words in (
+            ("m1", "youngsModulus peratomtype 5e6 5e6"), ("m2", "poissonsRatio peratomtype 0.3 0.3"),
+            ("m3", "coefficientRestitution peratomtypepair 2 0.9 0.1 0.1 0.1"),
+            ("m4", "coefficientFriction peratomtypepair 2 0 0 0 0"))) + "\n"
+        start = "atom_style nurbs body.json\nboundary f f f\nnewton off\ncommunicate single vel yes\n" \
+            "region b block -0.3 0.3 -0.3 0.3 -0.1 0.6 units box\ncreate_box 2 b\ncreate_atoms 1 single 0 0 0.1\n" \
+            "set group all nurbs/scale 0.04 density 2500\npair_style gran/nurbs model hertz tangential history\n" \
+            "pair_coeff * *\n"
+        energy = {}
+        for own, wall in ((1, 1), (2, 1), (2, 2)):
+            done = run("mesh m", mesh=sheet(2, 0.2), start=start, law=f"type {wall} model hertz tangential history",
+                       before=materials + MESH.replace("type 1", f"type {own}"), steps="run 20000", ranks=1 + (own == 2))
+            self.assertEqual("fix m has type 2, but this wall's type 1" in done.screen, own != wall)
+            energy[own, wall] = done.thermo["led[3]"][-1]
+        self.assertEqual(energy[2, 1], energy[1, 1])
+        self.assertGreater(energy[2, 2], 2 * energy[1, 1])
+
     def test_massflow_counts(self):
         ball = [(1, 1, 1, 0.03, 2500.0, 0.0, 0.0, 0.2, 1.0, 0.0, 0.0, 0.0)]
         door = sheet(2, 0.1, lambda x, y: 0.12)
