@@ -120,9 +120,21 @@ Row run(const families::Family& family, Entry& entry, double share, double secon
   return row;
 }
 
+// Those that are named, or all if none is.
+template <class T>
+void keep_named(int count, char** names, std::vector<T>* all) {
+  const auto named = [&](const T& entry) {
+    return std::any_of(names, names + std::max(count, 0),
+                       [&](const char* name) { return entry.name == std::string(name); });
+  };
+  if (std::none_of(all->begin(), all->end(), named)) return;
+  all->erase(std::remove_if(all->begin(), all->end(), [&](const T& entry) { return !named(entry); }),
+             all->end());
+}
+
 int main_program(int argc, char** argv) {
   if (argc < 2) {
-    std::fprintf(stderr, "usage: failure_table OUT.csv [SHARE [SECONDS [METHOD ...]]]\n");
+    std::fprintf(stderr, "usage: failure_table OUT.csv [SHARE [SECONDS [METHOD or FAMILY ...]]]\n");
     return 1;
   }
   const double share = argc > 2 ? std::atof(argv[2]) : 1, seconds = argc > 3 ? std::atof(argv[3]) : 10;
@@ -135,13 +147,10 @@ int main_program(int argc, char** argv) {
   for (int k = 1; k < families::kFailures; ++k) std::fprintf(out, ",%s", families::kFailureNames[k]);
   std::fprintf(out, ",us_median,us_99,what\n");
   std::vector<Entry> entries = all_methods();
-  if (argc > 4) {
-    const auto unnamed = [&](const Entry& e) {
-      return std::find(argv + 4, argv + argc, e.name) == argv + argc;
-    };
-    entries.erase(std::remove_if(entries.begin(), entries.end(), unnamed), entries.end());
-  }
-  for (const families::Family& family : families::all_families())
+  std::vector<families::Family> all = families::all_families();
+  keep_named(argc - 4, argv + 4, &entries);
+  keep_named(argc - 4, argv + 4, &all);
+  for (const families::Family& family : all)
     for (Entry& entry : entries) {
       const Row row = run(family, entry, share, seconds);
       std::fprintf(out, "%s,%s,%ld,%ld", family.name, entry.name.c_str(), row.pairs,

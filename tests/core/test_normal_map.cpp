@@ -6,6 +6,7 @@
 #include "nurbs/tolerances.h"
 #include "shapes/revolved.h"
 #include "support/bodies.h"
+#include "support/hidden_dents.h"
 #include "support/random.h"
 
 namespace nurbs {
@@ -146,46 +147,14 @@ TEST(NormalMap, promises_nothing_on_edges_that_run_through_dents) {
   EXPECT_FALSE(convex.shape->dented());
 }
 
-// A frustum, radius 1 to 0.6 and height 2, of a ruled wall whose upper circle is parametrised a little
-// differently: lines of equal parameter are no longer those of the cone, and lie inside it.
-std::vector<NurbsSurface> twisted_frustum(double factor) {
-  std::vector<NurbsSurface> surfaces;
-  const double w = std::sqrt(0.5);
-  for (int quarter = 0; quarter < 4; ++quarter) {
-    const double c[3] = {1, 1, 0}, s[3] = {0, 1, 1}, weight[3] = {1, w, 1}, turn = 0.5 * M_PI * quarter;
-    std::vector<Vec4> wall, bottom, top;
-    for (int k = 0; k < 3; ++k) {
-      const double x = std::cos(turn) * c[k] - std::sin(turn) * s[k],
-                   y = std::sin(turn) * c[k] + std::cos(turn) * s[k], other = weight[k] * std::pow(factor, k);
-      const Vec4 low = weight[k] * Vec4(x, y, -1, 1), high = other * Vec4(0.6 * x, 0.6 * y, 1, 1);
-      wall.insert(wall.end(), {low, high});
-      bottom.insert(bottom.end(), {weight[k] * Vec4(0, 0, -1, 1), low});
-      top.insert(top.end(), {high, other * Vec4(0, 0, 1, 1)});
-    }
-    for (const auto& points : {wall, bottom, top}) surfaces.push_back(bezier_surface(2, 1, points));
-  }
-  return surfaces;
-}
-
-// How far below the frustum's cone the wall is, at most.
-double hollow(const NurbsSurface& wall, const Vec3& slope) {
-  double depth = 0;
-  for (double u = 0; u <= 1; u += 0.05)
-    for (double v = 0; v <= 1; v += 0.1) {
-      const Vec3 x = evaluate(wall, u, v);
-      depth = std::max(depth, slope.dot(Vec3(1 - std::hypot(x[0], x[1]), 0, -1 - x[2])));
-    }
-  return depth;
-}
-
 TEST(Dents, of_walls_hardly_twisted_are_seen) {
   const Vec3 slope = Vec3(2, 0, 0.4).normalized();  // the cone's normal in its meridian
   Random random(7);
   for (const double off : {3e-6, 1e-5, 1e-4, 3e-4, 1e-3}) {
     SCOPED_TRACE(off);
-    const std::vector<NurbsSurface> surfaces = twisted_frustum(1 + off);
-    const ShapePointer shape = make_shape("twisted", surfaces);
-    const double depth = hollow(surfaces[0], slope);
+    const HiddenDent dent = twisted_frustum(off);
+    const ShapePointer shape = make_shape("twisted", dent.surfaces);
+    const double depth = dent.depth;
     ASSERT_GT(depth, 0.01 * off * off);
     EXPECT_GE(shape->support_excess, depth);
     EXPECT_LE(shape->support_excess, 10 * depth);
@@ -211,70 +180,16 @@ TEST(Dents, of_walls_hardly_twisted_are_seen) {
   }
 }
 
-// A block, x and y from -1 to 1, with a flat base at z = -2 and z = f(x) - dome y^2 / 2 on top: arcs of
-// Bernstein coefficients of f, each from where the last one ends.
-struct TopArc {
-  double to;
-  std::vector<double> z;
-};
-std::vector<NurbsSurface> block_under(const std::vector<TopArc>& arcs, double dome = 0) {
-  std::vector<NurbsSurface> surfaces;
-  const auto add = [&](int across, const std::vector<Vec3>& points) {
-    std::vector<Vec4> net;
-    for (const Vec3& p : points) net.push_back(Vec4(p[0], p[1], p[2], 1));
-    surfaces.push_back(bezier_surface(static_cast<int>(net.size()) / (across + 1) - 1, across, net));
-  };
-  const double bulge[] = {-0.5 * dome, 0.5 * dome, -0.5 * dome};  // over y = -1, 0, 1
-  double from = -1;
-  for (const TopArc& arc : arcs) {
-    std::vector<Vec3> top, base, front, back;
-    const double n = static_cast<double>(arc.z.size()) - 1;
-    for (size_t k = 0; k < arc.z.size(); ++k) {
-      const double x = from + (arc.to - from) * static_cast<double>(k) / n, z = arc.z[k];
-      for (int j = 0; j < 3; ++j) top.emplace_back(x, j - 1, z + bulge[j]);
-      const Vec3 near(x, -1, z + bulge[0]), far(x, 1, z + bulge[0]), low(x, -1, -2), deep(x, 1, -2);
-      base.insert(base.end(), {deep, low});
-      front.insert(front.end(), {low, near});
-      back.insert(back.end(), {far, deep});
-    }
-    add(2, top);
-    for (const auto& points : {base, front, back}) add(1, points);
-    from = arc.to;
-  }
-  for (const bool last : {false, true}) {
-    const double x = last ? 1 : -1, z = last ? arcs.back().z.back() : arcs.front().z.front();
-    std::vector<Vec3> end;
-    for (int j = 0; j < 3; ++j) {
-      const Vec3 low(x, j - 1, -2), high(x, j - 1, z + bulge[j]);
-      end.insert(end.end(), {last ? high : low, last ? low : high});
-    }
-    add(1, end);
-  }
-  return surfaces;
-}
-
-// Planes on the hull over the top's dent at `middle`, where its slope is `slope`, and small balls.
-template <class Top>
-void expect_contacts_over(const Shape& shape, const Top& top, double middle, double slope, double width) {
+// Planes and balls on the hull over a dent.
+void expect_contacts_over(const Shape& shape, const HiddenDent& dent) {
   Random random(3);
+  const Vec3 across = dent.normal.cross(Vec3::UnitY()).normalized();
   for (int k = 0; k < 60; ++k) {
-    const Vec3 d = Vec3(random.uniform(-1, 1) * width - slope, 0, 1).normalized();
-    double h = -kFarAway, best = 0;
-    const auto look = [&](double x) {
-      if (const double there = d[0] * x + d[2] * top(x); there > h) h = there, best = x;
-    };
-    for (int i = 0; i <= 2000; ++i) {  // dense around the dent
-      const double t = i / 1000.0 - 1;
-      look(std::clamp(middle + 2 * t * t * t, -1.0, 1.0));
-    }
-    for (double step = 3e-3; step > 1e-10; step *= 0.6) {
-      const double at = best;
-      for (int i = -4; i <= 4; ++i) look(std::clamp(at + 0.5 * i * step, -1.0, 1.0));
-    }
+    const Vec3 d = (dent.normal + random.uniform(-1, 1) * dent.width * across).normalized();
     const double size = k % 2 ? 1 : random.log_uniform(1e-3, 1),
                  gap = random.uniform(-1, 1) * size * random.log_uniform(1e-9, 1e-2);
     const Particle body{&shape, 1, Vec3::Zero(), Quat::Identity()};
-    const Vec3 on = Vec3(best, 0, top(best)) - shape.mass.center;
+    const Vec3 on = dent.support(d) - shape.mass.center;
     double memory[kPairMemorySize] = {0};
     ContactSettings settings;
     settings.tolerance = 1e-9;
@@ -292,32 +207,19 @@ void expect_contacts_over(const Shape& shape, const Top& top, double middle, dou
   }
 }
 
-// f'' = -a ((x - x0)^2 - w^2): a groove 2 w wide and 3 a w^4 / 4 deep, far narrower than a sample's step.
+// Far narrower than a sample's step.
 TEST(Dents, of_narrow_grooves_are_seen) {
   Random random(11);
   for (int k = 0; k < 40; ++k) {
-    const double a = random.log_uniform(0.1, 2), w = random.log_uniform(1e-3, 0.2),
-                 x0 = random.uniform(-0.6, 0.6), slope = random.uniform(-0.3, 0.3);
-    const auto top = [&](double x) {
-      const double t = x - x0;
-      return -a * t * t * t * t / 12 + a * w * w * t * t / 2 + slope * t;
-    };
-    // Bernstein coefficients of degree 4 from blossoms: of t^m the mean of products of m of the arguments.
-    std::vector<double> z;
-    for (int j = 0; j <= 4; ++j) {
-      const double p = -1 - x0, q = 1 - x0, n = j;  // q j times among four
-      const double two = (n * (n - 1) * q * q + 2 * n * (4 - n) * p * q + (4 - n) * (3 - n) * p * p) / 12;
-      z.push_back(-a / 12 * std::pow(p, 4 - j) * std::pow(q, j) + a * w * w / 2 * two +
-                  slope * (n * q + (4 - n) * p) / 4);
-    }
+    const double bend = random.log_uniform(0.1, 2), w = random.log_uniform(1e-3, 0.2);
+    const HiddenDent dent =
+        grooved_block(bend, w, random.uniform(-0.6, 0.6), random.uniform(-0.3, 0.3), k % 2 ? 0 : 0.3);
     SCOPED_TRACE("groove " + std::to_string(k));
-    const ShapePointer shape = make_shape("groove", block_under({{1, z}}, k % 2 ? 0 : 0.3));
-    const double depth = 0.75 * a * std::pow(w, 4);
-    ASSERT_NEAR(evaluate(shape->surfaces[0], 0.5, 0.5)[2], top(0), 1e-15);
-    EXPECT_GE(shape->support_excess, 0.99 * depth) << w;
-    EXPECT_LE(shape->support_excess, 6 * depth + 1e-14) << w;
-    EXPECT_GE(shape->concavity, 0.5 * depth - 1e-13) << w;
-    expect_contacts_over(*shape, top, x0, slope, 3 * a * w * w * w);
+    const ShapePointer shape = make_shape("groove", dent.surfaces);
+    EXPECT_GE(shape->support_excess, 0.99 * dent.depth) << w;
+    EXPECT_LE(shape->support_excess, 6 * dent.depth + 1e-14) << w;
+    EXPECT_GE(shape->concavity, 0.5 * dent.depth - 1e-13) << w;
+    expect_contacts_over(*shape, dent);
   }
 }
 
@@ -325,20 +227,11 @@ TEST(Dents, of_narrow_grooves_are_seen) {
 TEST(Dents, of_valleys_between_nearly_flat_panels_are_seen) {
   Random random(12);
   for (int k = 0; k < 40; ++k) {
-    const double bend = random.log_uniform(1e-9, 1e-4), close = random.log_uniform(1e-9, 1e-7),
-                 x0 = random.uniform(-0.6, 0.6), slope = random.uniform(-0.3, 0.3);
-    const auto top = [&](double x) {
-      const double t = x - x0;
-      return slope * t + 0.5 * close * std::abs(t) - 0.5 * bend * t * t;
-    };
-    const auto corner = [&](double from, double to) {  // the middle coefficient: the polar form
-      return 0.5 * slope * (from + to) + 0.25 * close * std::abs(from + to) - 0.5 * bend * from * to;
-    };
+    const double bend = random.log_uniform(1e-9, 1e-4), close = random.log_uniform(1e-9, 1e-7);
+    const HiddenDent dent =
+        valley_block(bend, close, random.uniform(-0.6, 0.6), random.uniform(-0.3, 0.3), k % 4 ? 0.3 : 0);
     SCOPED_TRACE("valley " + std::to_string(k));
-    const ShapePointer shape = make_shape(
-        "valley", block_under({{x0, {top(-1), corner(-1 - x0, 0), 0}}, {1, {0, corner(0, 1 - x0), top(1)}}},
-                              k % 4 ? 0.3 : 0));
-    expect_contacts_over(*shape, top, x0, slope, close);
+    expect_contacts_over(*make_shape("valley", dent.surfaces), dent);
   }
 }
 

@@ -6,6 +6,8 @@
 #include <cmath>
 #include <map>
 
+#include "shapes/revolved.h"
+#include "support/hidden_dents.h"
 #include "support/least_overlap.h"
 
 namespace nurbs::families {
@@ -126,6 +128,99 @@ PairCase far_sizes(Random& random, long) {
   return c;
 }
 
+// Bodies with dents that samples do not show, and where those are.
+struct DentedSolid {
+  Solid solid;  // its first normal is the hull's over the dent
+  double width;
+};
+const std::vector<DentedSolid>& dented_solids() {
+  static const std::vector<DentedSolid> all = [] {
+    Random random(1010);
+    std::vector<DentedSolid> made;
+    for (int k = 0; k < 18; ++k) {
+      const double x0 = random.uniform(-0.6, 0.6), slope = random.uniform(-0.3, 0.3),
+                   dome = k % 2 ? 0 : random.uniform(0.1, 0.5);
+      const test::HiddenDent dent =
+          k < 8    ? test::grooved_block(random.log_uniform(0.1, 2), random.log_uniform(1e-3, 0.1), x0, slope,
+                                         dome)
+          : k < 14 ? test::valley_block(random.log_uniform(1e-9, 1e-4), random.log_uniform(1e-9, 1e-7), x0,
+                                        slope, dome)
+                   : test::twisted_frustum(random.log_uniform(1e-5, 1e-3));
+      made.push_back(
+          {test::turned_solid(random, "dented", dent.surfaces, dent.support, {dent.normal}), dent.width});
+    }
+    return made;
+  }();
+  return all;
+}
+
+// A ball, or apart an ellipsoid, down to a thousandth of the body, over its dent.
+PairCase hidden_dent(Random& random, long) {
+  static const Solid oval = test::ellipsoid_solid(Vec3(1, 0.8, 0.6));
+  const auto& bodies = dented_solids();
+  const DentedSolid& dented = bodies[random.below(static_cast<int>(bodies.size()))];
+  const Solid &a = dented.solid, &b = random.below(2) ? oval : unit_ball();
+  PairCase c;
+  c.a = {a.shape.get(), 1, Vec3::Zero(), random.turn()};
+  c.b = {b.shape.get(), random.log_uniform(1e-3, 1), Vec3::Zero(), random.turn()};
+  const double off = random.below(3) ? dented.width * random.uniform(0, 2) : random.log_uniform(1e-9, 0.3);
+  const Vec3 n = (c.a.q * (a.normals[0] + off * random.direction())).normalized();
+  const double gap = c.b.scale * random.log_uniform(1e-9, 1e-2) * (&b == &oval ? 1 : random.sign());
+  // Of a ball whose centre is outside the hull the gap's sign makes no difference: the nearest point is
+  // known.
+  c.b.x = support_of(a, c.a, n) - support_of(b, c.b, -n) + gap * n;
+  c.overlap = [&a, &b, ca = c.a, cb = c.b](const Vec3& d) {
+    return d.dot(support_of(a, ca, d)) - d.dot(support_of(b, cb, -d)) - d.dot(cb.x - ca.x);
+  };
+  c.truth.gap = gap;
+  c.truth.has_normal = true;
+  c.truth.normal = n;
+  return c;
+}
+
+// Bodies that hold a ball of radius 1 which part of their surface lies on, its centre at the file's origin.
+const std::vector<Solid>& balls_in_part() {
+  static const std::vector<Solid> all = [] {
+    Random random(1011);
+    const double c = std::sqrt(0.5);
+    const auto bullet = revolve({{Vec2(0, -1.5), Vec2::Zero(), Vec2(1, -1.5), 0},
+                                 {Vec2(1, -1.5), Vec2::Zero(), Vec2(1, 0), 0},
+                                 {Vec2(1, 0), Vec2(1, 1), Vec2(0, 1), c}});
+    const auto round = [](const Vec3& d, double tall, double low) {  // a ball above, more below
+      const double across = std::hypot(d[0], d[1]);
+      if (d[2] >= 0) return Vec3(d.normalized());
+      const Vec2 along = across > 0 ? Vec2(d[0] / across, d[1] / across) : Vec2(1, 0);
+      if (low > 0) return Vec3(along[0], along[1], -low);
+      const double h = std::hypot(across, tall * d[2]);
+      return Vec3(across * along[0] / h, across * along[1] / h, tall * tall * d[2] / h);
+    };
+    std::vector<Solid> made = {unit_ball()};
+    for (int k = 0; k < 2; ++k) {
+      made.push_back(
+          test::turned_solid(random, "bullet", bullet, [=](const Vec3& d) { return round(d, 1, 1.5); }));
+      made.push_back(
+          test::turned_solid(random, "egg", egg(1, 1.4, 1), [=](const Vec3& d) { return round(d, 1.4, 0); }));
+    }
+    return made;
+  }();
+  return all;
+}
+
+// Of two such about one centre every direction in which both show the balls is as good.
+PairCase one_centre(Random& random, long) {
+  const std::vector<Solid>& bodies = balls_in_part();
+  const Solid &a = bodies[random.below(5)], &b = bodies[random.below(5)];
+  PairCase c;
+  c.a = {a.shape.get(), 1, Vec3::Zero(), random.turn()};
+  c.b = {b.shape.get(), random.log_uniform(0.2, 5), Vec3::Zero(), random.turn()};
+  c.b.x = c.a.q * -a.shape->mass.center - c.b.scale * (c.b.q * -b.shape->mass.center);
+  c.overlap = [&a, &b, ca = c.a, cb = c.b](const Vec3& d) {
+    return d.dot(support_of(a, ca, d)) - d.dot(support_of(b, cb, -d)) - d.dot(cb.x - ca.x);
+  };
+  c.truth.gap = -(1 + c.b.scale);
+  return c;
+}
+
 }  // namespace
 
 const std::vector<Solid>& solids_of(Kind kind) {
@@ -151,6 +246,9 @@ const std::vector<Family>& solid_families() {
       {"triangles", "polyhedra of bilinear patches with an edge collapsed", kPairs,
        [](Random& r, long) { return of_kind(Kind::polyhedron, r); }},
       {"size ratio 1e6", "the same, sizes 1e3 to 1e6 : 1", kPairs, far_sizes},
+      {"hidden dents", "grooves, valleys and twisted walls that samples do not show, under balls to 1 : 1000",
+       kPairs, hidden_dent},
+      {"one centre", "balls, bullets and eggs whose balls are about one centre", kPairs, one_centre},
   };
   return all;
 }

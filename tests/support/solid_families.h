@@ -1,5 +1,6 @@
 // The failure table's families of bodies that are no smooth ovals: cones, cylinders, capsules, lenses,
-// polyhedra of degenerate patches, and bodies of very different sizes, with truths from closed forms.
+// polyhedra of degenerate patches, bodies of very different sizes, dents too narrow for samples, and balls'
+// parts about one centre, with truths from closed forms.
 #pragma once
 
 #include <vector>
