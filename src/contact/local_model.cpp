@@ -7,6 +7,12 @@
 #include "nurbs/tolerances.h"
 
 namespace nurbs {
+namespace {
+
+constexpr double kOfTurn = 0.9999;  // sines and chords stand for angles, of 0.01 rad at most
+
+}  // namespace
+
 bool make_support_model(const Mat3& axes, const Vec3& center, const JetLanes& jet, const LocalRate& local,
                         SupportModel* model) {
   if (!(local.rate < kFarAway)) return false;
@@ -41,10 +47,11 @@ SupportModel plane_model(const Vec3& normal) {
   return m;
 }
 
-void limit_turn(const Shape& shape, double scale, double turn, SupportModel* model) {
+void limit_turn(const Shape& shape, double turn, SupportModel* model) {
   if (shape.normal_map.cells == 0) return;
-  // W (d - n) is at least the least curvature radius times the turn.
-  model->room = std::min(model->room, turn * scale * shape.patch_curvature.min_radius);
+  // The way W (d - n) is at least W's least eigenvalue times the turn, seen along the tangent plane.
+  const double least = 0.5 * (model->w0 + model->w2) - std::hypot(0.5 * (model->w0 - model->w2), model->w1);
+  model->room = std::min(model->room, kOfTurn * turn * std::max(0.0, least));
 }
 
 }  // namespace nurbs

@@ -80,7 +80,7 @@ NURBS_INLINE Real cubic_remainder(const Real& rate, const Real& angle2) {
 
 // Keeps the model from turns that may reach another support point: to `turn` (rad) at most. On bodies whose
 // normal map says where those are; others have none.
-void limit_turn(const Shape& shape, double scale, double turn, SupportModel* model);
+void limit_turn(const Shape& shape, double turn, SupportModel* model);
 
 // The contact now: `turn_a`, `turn_b` turn the bodies' axes into the lab's, B's centre is at `offset` from
 // A's. `free` is 1, or 0 where the direction is A's normal whatever B does (A a plane). No surface

@@ -132,22 +132,43 @@ struct ModelSide {
   double turned2;
 };
 
-// Whether a model of such a contact, at that gap, would serve.
-inline bool is_worth_a_model(const ModelSide& a, const ModelSide& b, double gap, double tolerance,
-                             double size) {
-  return may_serve(local_rate(a.shape, a.scale, a.at).rate, local_rate(b.shape, b.scale, b.at).rate,
-                   a.turned2, b.turned2, gap, tolerance, size);
+// Whether the models of two bodies that turn as they did would serve once more: by the error that they would
+// report then. `turn_b` turns B's axes into A's.
+inline bool serves_next(const ModelSide& a, const ModelSide& b, const Mat3& turn_b, const LocalModel& m,
+                        double gap, double tolerance, double size) {
+  const Vec3 ta = vec(m.a.tangent), sa = vec(m.a.normal).cross(ta), tb = turn_b * vec(m.b.tangent),
+             sb = (turn_b * vec(m.b.normal)).cross(tb);
+  const double tt = tb.dot(ta), ts = tb.dot(sa), st = sb.dot(ta), ss = sb.dot(sa);
+  // W_A + W_B along t_A and s_A; beside them the overlap is small.
+  const double m11 = m.a.w0 + tt * (m.b.w0 * tt + m.b.w1 * st) + st * (m.b.w1 * tt + m.b.w2 * st),
+               m12 = m.a.w1 + tt * (m.b.w0 * ts + m.b.w1 * ss) + st * (m.b.w1 * ts + m.b.w2 * ss),
+               m22 = m.a.w2 + ts * (m.b.w0 * ts + m.b.w1 * ss) + ss * (m.b.w1 * ts + m.b.w2 * ss);
+  const double soft = (m11 + m22) / (m11 * m22 - m12 * m12), a2 = 0.5 * a.turned2, b2 = 0.5 * b.turned2,
+               left = 0.5 * (m.a.rate * a2 + m.b.rate * b2),
+               error = cubic_remainder(m.a.rate, a2) + cubic_remainder(m.b.rate, b2) +
+                       2 * kRemainderSafety * left * left * soft;
+  const double changes = m.a.rate * std::sqrt(a2) + m.b.rate * std::sqrt(b2) +
+                         (m.a.rate + m.b.rate) * 2 * soft * left;  // of W, to the minimum
+  return soft > 0 && changes * soft <= 0.5 &&
+         error <= 0.5 * tolerance * std::fmax(std::abs(gap), kForceDepth * size) &&
+         kRemainderShare * left * soft <= tolerance;
 }
 
-// The local model of a contact that is its pair's only one below an overlap of `unique`, and whose normal may
-// turn by `turn` rad before another support point takes over; none where there can't be one.
-inline void make_local_model(const ModelSide& a, const ModelSide& b, double unique, double turn,
-                             LocalModel* model) {
-  if (!(turn > 0)) return;
-  if (!make_support_model(a.axes, a.center, a.jet, local_rate(a.shape, a.scale, a.at), &model->a)) return;
-  if (!make_support_model(b.axes, b.center, b.jet, local_rate(b.shape, b.scale, b.at), &model->b)) return;
-  limit_turn(a.shape, a.scale, turn, &model->a);
-  limit_turn(b.shape, b.scale, turn, &model->b);
+// The local model of a contact at a gap that is its pair's only one below an overlap of `unique`, and whose
+// normal may turn by turn() rad before another support point takes over; none where it would not serve or
+// there can't be one. `turn_b` turns B's axes into A's. 100 ns, and what turn() takes.
+template <class Turn>
+void make_local_model(const ModelSide& a, const ModelSide& b, const Mat3& turn_b, double gap,
+                      double tolerance, double size, double unique, const Turn& turn, LocalModel* model) {
+  const LocalRate rate_a = local_rate(a.shape, a.scale, a.at), rate_b = local_rate(b.shape, b.scale, b.at);
+  if (!may_serve(rate_a.rate, rate_b.rate, a.turned2, b.turned2, gap, tolerance, size)) return;
+  if (!make_support_model(a.axes, a.center, a.jet, rate_a, &model->a)) return;
+  if (!make_support_model(b.axes, b.center, b.jet, rate_b, &model->b)) return;
+  if (!serves_next(a, b, turn_b, *model, gap, tolerance, size)) return;
+  const double most = turn();
+  if (!(most > 0)) return;
+  limit_turn(a.shape, most, &model->a);
+  limit_turn(b.shape, most, &model->b);
   model->unique = unique;
 }
 
@@ -159,7 +180,7 @@ inline bool make_wall_model(const Particle& particle, const SurfacePoint& at, do
   if (!may_serve(0, local.rate, 0, turned2, gap, tolerance, size)) return false;
   scale(particle.scale, &jet);
   if (!make_support_model(Mat3::Identity(), Vec3::Zero(), jet, local, model)) return false;
-  limit_turn(*particle.shape, particle.scale, kNormalMargin, model);
+  limit_turn(*particle.shape, kNormalMargin, model);
   return true;
 }
 

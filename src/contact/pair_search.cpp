@@ -415,9 +415,11 @@ class Ladder {
     const ModelSide a{*pair.a, pair.scale_a, s.base_a, s.jet_a, Mat3::Identity(), Vec3::Zero(), turned2_a};
     const ModelSide b{*pair.b,     pair.scale_b, s.base_b, s.jet_b, pair.turn.transpose(),
                       pair.offset, turned2_b};
-    if (!is_worth_a_model(a, b, s.gap, settings_.tolerance, pair.size)) return;
-    const double turn = s.dented ? turn_to_rival(s.side_a(pair), s.side_b(pair)) : kNormalMargin;
-    make_local_model(a, b, 0.5 * s.bracket.unique, turn, &memory_.model);
+    const auto turn = [&] {
+      return s.dented ? turn_to_rival(s.side_a(pair), s.side_b(pair)) : kNormalMargin;
+    };
+    make_local_model(a, b, pair.turn, s.gap, settings_.tolerance, pair.size, 0.5 * s.bracket.unique, turn,
+                     &memory_.model);
   }
 
   const Particle &a_, &b_;

@@ -86,10 +86,11 @@ void ContactStages::follow_surfaces(ContactBlock& block, int first, Results& res
     };
     const ModelSide side_a = side(pa, pairs.base_a[l], pairs.jet_a[l], proof.q_a),
                     side_b = side(pb, pairs.base_b[l], pairs.jet_b[l], proof.q_b);
-    if (is_worth_a_model(side_a, side_b, pairs.gap[l], step_.settings.tolerance, pairs.size[l])) {
-      const double turn = pairs.dented[l] ? turn_to_rival(pairs.side_a(l), pairs.side_b(l)) : kNormalMargin;
-      make_local_model(side_a, side_b, 0.5 * pairs.unique[l], turn, &model);
-    }
+    const auto turn = [&] {
+      return pairs.dented[l] ? turn_to_rival(pairs.side_a(l), pairs.side_b(l)) : kNormalMargin;
+    };
+    make_local_model(side_a, side_b, (pa.q.conjugate() * pb.q).toRotationMatrix(), pairs.gap[l],
+                     step_.settings.tolerance, pairs.size[l], 0.5 * pairs.unique[l], turn, &model);
     if (model.unique > 0)
       block.set(lane, 0, kLocalModelSize, &model);
     else
