@@ -240,6 +240,7 @@ double climb(const Measure& measure, SurfacePoint& at, double step, const Climb&
 double worst_of(const Measure& measure, const std::vector<SurfacePoint>& places, double step,
                 const Climb& how, SurfacePoint& where) {
   std::vector<std::pair<double, SurfacePoint>> found;
+  found.reserve(places.size());
   for (const SurfacePoint& place : places) found.push_back({measure(place), place});
   const auto first = [](const auto& a, const auto& b) { return a.first > b.first; };
   std::stable_sort(found.begin(), found.end(), first);

@@ -28,7 +28,8 @@ constexpr int kLocalCellsPerPatch = 100;
 // The same for the proof of convexity, where no hollow is seen: without it every support is doubted.
 constexpr int kConvexBudget = 6;
 // And for hollows that the middles of large cells miss.
-constexpr int kHuntCells = 2000, kHuntCellsPerPatch = 100;
+constexpr int kHuntCells = 6000, kHuntCellsPerPatch = 200;
+constexpr int kBlindPerPatch = 4;       // cells without bounds that are gone down into: at tips none come
 constexpr double kLeastHollow = 1e-12;  // share of the bounding radius that one may be deep
 constexpr double kUnknownBend = 1e6;    // over that radius: of cells without bounds
 constexpr double kAsHollow = 2;         // times what is seen: a cell hides nothing worse
@@ -593,8 +594,11 @@ class Bounder {
     const double size = shape_.bounding_radius;
     if (b.convex || is_flat(b, size) || left_as_sliver(leaf) || leaf.depth >= kDeepestUnproven) return 0;
     const double known = std::max(0.0, -kAsHollow * b.seen_curvature),
-                 bend = b.regular ? size * (-b.least_curvature - known) : kInfinity;
-    return std::max(0.0, bend < kInfinity ? bend : kUnknownBend) * leaf.cell.du * leaf.cell.dv;
+                 bend = has_bounds(leaf) ? size * (-b.least_curvature - known) : kUnknownBend;
+    return std::max(0.0, bend) * leaf.cell.du * leaf.cell.dv;
+  }
+  static bool has_bounds(const Leaf& leaf) {
+    return leaf.bounds.regular && leaf.bounds.least_curvature > -kInfinity;
   }
 
   // Goes down into the cells that may hide most, one after the other, `cells` allowing, to where they may
@@ -604,10 +608,10 @@ class Bounder {
     std::vector<char> left(patches_, false);
     for (const Leaf& leaf : out_.leaves) left[leaf.cell.patch] |= hidden_hollow(leaf) > kLeastHollow;
     using Entry = std::pair<double, int>;
-    std::priority_queue<Entry> open;
+    std::array<std::priority_queue<Entry>, 2> open;  // with bounds, and without, in turn
     const auto enter = [&](int k) {
       const double hidden = hidden_hollow(leaves[k]);
-      if (hidden > kLeastHollow) open.push({hidden, k});
+      if (hidden > kLeastHollow) open[!has_bounds(leaves[k])].push({hidden, k});
     };
     const auto note = [&](const Leaf& leaf) {
       if (is_hollow(leaf)) out_.hollows.push_back(leaf);
@@ -617,9 +621,14 @@ class Bounder {
         note(leaves[k]);
         enter(k);
       }
-    while (!open.empty() && out_.cells < cells) {
-      int k = open.top().second;
-      open.pop();
+    int blind = kBlindPerPatch * patches_;
+    for (int turn = 0; out_.cells < cells; turn = 1 - turn) {
+      const bool seeing = open[1].empty() || blind == 0 || (turn == 0 && !open[0].empty());
+      auto& next = open[seeing ? 0 : 1];
+      if (next.empty()) break;
+      if (!seeing) --blind;
+      int k = next.top().second;
+      next.pop();
       while (hidden_hollow(leaves[k]) > kLeastHollow) {
         leaves.push_back(halve_either_way(&leaves[k]));
         const int other = static_cast<int>(leaves.size()) - 1;

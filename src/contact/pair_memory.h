@@ -143,7 +143,7 @@ inline bool serves_next(const ModelSide& a, const ModelSide& b, const Mat3& turn
   const double m11 = m.a.w0 + tt * (m.b.w0 * tt + m.b.w1 * st) + st * (m.b.w1 * tt + m.b.w2 * st),
                m12 = m.a.w1 + tt * (m.b.w0 * ts + m.b.w1 * ss) + st * (m.b.w1 * ts + m.b.w2 * ss),
                m22 = m.a.w2 + ts * (m.b.w0 * ts + m.b.w1 * ss) + ss * (m.b.w1 * ts + m.b.w2 * ss);
-  const double soft = (m11 + m22) / (m11 * m22 - m12 * m12), a2 = 0.5 * a.turned2, b2 = 0.5 * b.turned2,
+  const double soft = (m11 + m22) / (m11 * m22 - m12 * m12), a2 = 0.25 * a.turned2, b2 = 0.25 * b.turned2,
                left = 0.5 * (m.a.rate * a2 + m.b.rate * b2),
                error = cubic_remainder(m.a.rate, a2) + cubic_remainder(m.b.rate, b2) +
                        2 * kRemainderSafety * left * left * soft;
@@ -156,15 +156,15 @@ inline bool serves_next(const ModelSide& a, const ModelSide& b, const Mat3& turn
 
 // The local model of a contact at a gap that is its pair's only one below an overlap of `unique`, and whose
 // normal may turn by turn() rad before another support point takes over; none where it would not serve or
-// there can't be one. `turn_b` turns B's axes into A's. 100 ns, and what turn() takes.
-template <class Turn>
-void make_local_model(const ModelSide& a, const ModelSide& b, const Mat3& turn_b, double gap,
+// there can't be one. turn_b() turns B's axes into A's. 100 ns, and what turn() takes.
+template <class TurnB, class Turn>
+void make_local_model(const ModelSide& a, const ModelSide& b, const TurnB& turn_b, double gap,
                       double tolerance, double size, double unique, const Turn& turn, LocalModel* model) {
   const LocalRate rate_a = local_rate(a.shape, a.scale, a.at), rate_b = local_rate(b.shape, b.scale, b.at);
   if (!may_serve(rate_a.rate, rate_b.rate, a.turned2, b.turned2, gap, tolerance, size)) return;
   if (!make_support_model(a.axes, a.center, a.jet, rate_a, &model->a)) return;
   if (!make_support_model(b.axes, b.center, b.jet, rate_b, &model->b)) return;
-  if (!serves_next(a, b, turn_b, *model, gap, tolerance, size)) return;
+  if (!serves_next(a, b, turn_b(), *model, gap, tolerance, size)) return;
   const double most = turn();
   if (!(most > 0)) return;
   limit_turn(a.shape, most, &model->a);

@@ -418,8 +418,9 @@ class Ladder {
     const auto turn = [&] {
       return s.dented ? turn_to_rival(s.side_a(pair), s.side_b(pair)) : kNormalMargin;
     };
-    make_local_model(a, b, pair.turn, s.gap, settings_.tolerance, pair.size, 0.5 * s.bracket.unique, turn,
-                     &memory_.model);
+    make_local_model(
+        a, b, [&] { return pair.turn; }, s.gap, settings_.tolerance, pair.size, 0.5 * s.bracket.unique, turn,
+        &memory_.model);
   }
 
   const Particle &a_, &b_;

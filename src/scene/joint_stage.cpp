@@ -89,8 +89,9 @@ void ContactStages::follow_surfaces(ContactBlock& block, int first, Results& res
     const auto turn = [&] {
       return pairs.dented[l] ? turn_to_rival(pairs.side_a(l), pairs.side_b(l)) : kNormalMargin;
     };
-    make_local_model(side_a, side_b, (pa.q.conjugate() * pb.q).toRotationMatrix(), pairs.gap[l],
-                     step_.settings.tolerance, pairs.size[l], 0.5 * pairs.unique[l], turn, &model);
+    const auto turn_b = [&] { return (pa.q.conjugate() * pb.q).toRotationMatrix(); };
+    make_local_model(side_a, side_b, turn_b, pairs.gap[l], step_.settings.tolerance, pairs.size[l],
+                     0.5 * pairs.unique[l], turn, &model);
     if (model.unique > 0)
       block.set(lane, 0, kLocalModelSize, &model);
     else

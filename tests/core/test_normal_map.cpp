@@ -223,6 +223,19 @@ TEST(Dents, of_narrow_grooves_are_seen) {
   }
 }
 
+// Round a tip, about which no cells have bounds.
+TEST(Dents, of_ring_grooves_about_a_tip_are_seen) {
+  Random random(13);
+  for (int k = 0; k < 24; ++k) {
+    const double bend = random.log_uniform(0.2, 2), w = random.log_uniform(8e-3, 0.1);
+    const HiddenDent dent = ringed_cone(bend, w, random.uniform(0.3, 0.8), random.uniform(0.05, 0.4));
+    SCOPED_TRACE("ring " + std::to_string(k));
+    const ShapePointer shape = make_shape("ring", dent.surfaces);
+    EXPECT_GT(shape->support_excess, 0.3 * dent.depth);
+    expect_contacts_over(*shape, dent);
+  }
+}
+
 // Two panels, hardly bent, that close by less than what is a kink.
 TEST(Dents, of_valleys_between_nearly_flat_panels_are_seen) {
   Random random(12);

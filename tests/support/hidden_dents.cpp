@@ -5,7 +5,7 @@
 #include <cmath>
 
 #include "nurbs/bezier_patch.h"
-#include "shapes/primitives.h"
+#include "shapes/revolved.h"
 
 namespace nurbs::test {
 namespace {
@@ -71,47 +71,93 @@ std::function<Vec3(const Vec3&)> block_support(const Top& top, const Best& best,
 
 }  // namespace
 
-HiddenDent grooved_block(double bend, double w, double x0, double slope, double dome) {
-  const auto top = [=](double x) {
+namespace {
+
+// f(x) = -bend t^4 / 12 + bend w^2 t^2 / 2 + slope t, t = x - x0, from `low` to 1: a groove between t = -w
+// and w.
+struct Groove {
+  double bend, w, x0, slope, low;
+
+  double operator()(double x) const {
     const double t = x - x0;
     return -bend * t * t * t * t / 12 + bend * w * w * t * t / 2 + slope * t;
-  };
+  }
   // Bernstein coefficients of degree 4 from blossoms: of t^m the mean of products of m of the arguments, j of
   // which are q.
-  std::vector<double> z;
-  const double p = -1 - x0, q = 1 - x0;
-  for (int j = 0; j <= 4; ++j) {
-    const double n = j;
-    const double two = (n * (n - 1) * q * q + 2 * n * (4 - n) * p * q + (4 - n) * (3 - n) * p * p) / 12;
-    z.push_back(-bend / 12 * std::pow(p, 4 - j) * std::pow(q, j) + bend * w * w / 2 * two +
-                slope * (n * q + (4 - n) * p) / 4);
+  std::vector<double> coefficients() const {
+    std::vector<double> z;
+    const double p = low - x0, q = 1 - x0;
+    for (int j = 0; j <= 4; ++j) {
+      const double n = j;
+      const double two = (n * (n - 1) * q * q + 2 * n * (4 - n) * p * q + (4 - n) * (3 - n) * p * p) / 12;
+      z.push_back(-bend / 12 * std::pow(p, 4 - j) * std::pow(q, j) + bend * w * w / 2 * two +
+                  slope * (n * q + (4 - n) * p) / 4);
+    }
+    return z;
   }
-  const auto best = [=](double s) {
+  // The x at which s x + f(x) is largest.
+  double best(double s) const {
     const auto rises = [&](double x) {
       const double t = x - x0;
       return s + slope - bend * t * t * t / 3 + bend * w * w * t;
     };
-    double at = -1, most = -1e300;
+    double at = low, most = -1e300;
     const auto look = [&](double x) {
-      if (const double there = s * x + top(x); there > most) most = there, at = x;
+      if (const double there = s * x + (*this)(x); there > most) most = there, at = x;
     };
-    look(-1);
+    look(low);
     look(1);
     // Between the inflections the slope goes one way.
-    const double ends[] = {-1, std::clamp(x0 - w, -1.0, 1.0), std::clamp(x0 + w, -1.0, 1.0), 1};
+    const double ends[] = {low, std::clamp(x0 - w, low, 1.0), std::clamp(x0 + w, low, 1.0), 1};
     for (int k = 0; k < 3; ++k) {
-      double low = ends[k], high = ends[k + 1];
-      if (!(rises(low) > 0 && rises(high) <= 0)) continue;
+      double from = ends[k], to = ends[k + 1];
+      if (!(rises(from) > 0 && rises(to) <= 0)) continue;
       for (int step = 0; step < 60; ++step) {
-        const double middle = 0.5 * (low + high);
-        (rises(middle) > 0 ? low : high) = middle;
+        const double middle = 0.5 * (from + to);
+        (rises(middle) > 0 ? from : to) = middle;
       }
-      look(0.5 * (low + high));
+      look(0.5 * (from + to));
     }
     return at;
+  }
+  double width() const { return 3 * bend * w * w * w; }
+  double depth() const { return 0.75 * bend * std::pow(w, 4); }
+};
+
+}  // namespace
+
+HiddenDent grooved_block(double bend, double w, double x0, double slope, double dome) {
+  const Groove top{bend, w, x0, slope, -1};
+  return {block_under({{1, top.coefficients()}}, dome), Vec3(-slope, 0, 1).normalized(), top.width(),
+          top.depth(),
+          block_support(
+              top, [=](double s) { return top.best(s); }, dome)};
+}
+
+HiddenDent ringed_cone(double bend, double w, double r0, double shear) {
+  // Steep enough at the tip.
+  const Groove top{bend, w, r0, -0.5 - bend * r0 * (w * w + r0 * r0), 0};
+  const std::vector<double> z = top.coefficients();
+  std::vector<Vec3> curve;
+  for (int k = 4; k >= 0; --k) curve.emplace_back(k / 4.0, z[k], 1);
+  HiddenDent out;
+  out.surfaces = {surface_of_revolution({Vec3(0, z[4], 1), Vec3(1, z[4], 1)}), surface_of_revolution(curve)};
+  Mat3 affine = Mat3::Identity();
+  affine(0, 2) = shear;
+  affine(1, 1) = 1 + shear;
+  for (NurbsSurface& s : out.surfaces)
+    for (Vec4& p : s.points) p.head<3>() = (affine * p.head<3>()).eval();
+  const double base = z[4];
+  out.support = [=](const Vec3& d) -> Vec3 {
+    const Vec3 e = affine.transpose() * d;
+    const double across = std::hypot(e[0], e[1]), r = e[2] > 0 ? top.best(across / e[2]) : 1;
+    const Vec2 along = across > 0 ? Vec2(e[0] / across, e[1] / across) : Vec2(1, 0);
+    return affine * Vec3(r * along[0], r * along[1], e[2] > 0 ? top(r) : base);
   };
-  return {block_under({{1, z}}, dome), Vec3(-slope, 0, 1).normalized(), 3 * bend * w * w * w,
-          0.75 * bend * std::pow(w, 4), block_support(top, best, dome)};
+  out.normal = (affine.inverse().transpose() * Vec3(-top.slope, 0, 1)).normalized();
+  out.width = top.width();
+  out.depth = out.normal.dot(affine.col(2)) * top.depth();  // at this azimuth
+  return out;
 }
 
 HiddenDent valley_block(double bend, double close, double x0, double slope, double dome) {
