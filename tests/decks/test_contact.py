@@ -420,6 +420,7 @@ class BadInput(unittest.TestCase):
 
     def test_pair_style(self):
         for style, words in (("gran/nurbs tolerance 0", ("tolerance = 0", "[1e-15, 0.1]")),
+                             ("gran/nurbs tolerance 1e-4 tolerance 1e-5", ("tolerance is there twice",)),
                              ("gran/nurbs tolerance", ("tolerance", "value")),
                              ("gran/nurbs solver gjk", ("gjk", "default or cso")),
                              ("gran/nurbs speed 1", ("unknown keyword speed", "allowed"))):
