@@ -16,7 +16,6 @@
 namespace nurbs {
 namespace {
 
-constexpr int kExcessRounds = 12;     // halvings of the step: grooves are narrower than that
 constexpr size_t kClimbs = 4;         // places that are refined
 constexpr size_t kInwardPlaces = 8;   // of cells that bend inward, of either kind
 constexpr double kLeastDepth = 0.25;  // of the excess: a shallow dent's is about that at least
@@ -286,9 +285,8 @@ std::vector<SurfacePoint> places_inward(const SurfaceBounds& bounds, double size
   std::vector<std::array<Worst, 2>> of(bounds.even.size());
   for (const auto* leaves : {&bounds.leaves, &bounds.hollows})
     for (const Leaf& leaf : *leaves) {
-      const CellBounds& b = leaf.bounds;
-      if (b.convex || !(b.seen_curvature < -kCurvatureNoise / size)) continue;
-      const double bend[] = {b.seen_curvature * leaf.cell.du * leaf.cell.dv, b.seen_curvature};
+      if (leaf.bounds.convex || !is_hollow(leaf.bounds, size)) continue;
+      const double seen = leaf.bounds.seen_curvature, bend[] = {seen * leaf.cell.du * leaf.cell.dv, seen};
       for (int k = 0; k < 2; ++k)
         if (Worst& worst = of[leaf.cell.patch][k]; bend[k] < worst.bend) worst = {bend[k], leaf.middle};
     }

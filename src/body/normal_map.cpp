@@ -2,6 +2,7 @@
 #include "body/normal_map.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <vector>
 
@@ -81,14 +82,15 @@ class WidePainter {
     for (int face = 0; face < 6; ++face)
       for (int i = 0; i < cells; i += kSide)
         for (int j = 0; j < cells; j += kSide) {
-          const auto corner = [&](int di, int dj) {
-            return cell_middle(face, i + di, j + dj, cells).normalized();
-          };
-          const int last = kSide - 1;
-          Block block{(face * cells + i) * cells + j,
-                      (corner(0, 0) + corner(0, last) + corner(last, 0) + corner(last, last)).normalized()};
-          for (const Vec3& d : {corner(0, 0), corner(0, last), corner(last, 0), corner(last, last)})
-            widest_ = std::max(widest_, angle_between(d, block.middle));
+          Block block{(face * cells + i) * cells + j, Vec3::Zero()};
+          std::array<Vec3, 4> corner;
+          for (int k = 0; k < 4; ++k) {
+            corner[k] =
+                cell_middle(face, i + k / 2 * (kSide - 1), j + k % 2 * (kSide - 1), cells).normalized();
+            block.middle += corner[k];
+          }
+          block.middle.normalize();
+          for (const Vec3& d : corner) widest_ = std::max(widest_, angle_between(d, block.middle));
           blocks_.push_back(block);
         }
   }
@@ -132,16 +134,19 @@ class Painter {
  private:
   bool may_close(int patch, int edge) const {
     const EdgeLink& link = shape_.links[patch][edge];
-    if (link.patch < 0 || link.kink < -kNoKink) return true;
-    return bound_kink(shape_.patches[patch], edge, shape_.patches[link.patch], link).closing > kNoKink;
+    return link.patch < 0 || link.kink < -kNoKink || closing(patch, edge) > kNoKink;
+  }
+  double closing(int patch, int edge) const {
+    const EdgeLink& link = shape_.links[patch][edge];
+    return bound_kink(shape_.patches[patch], edge, shape_.patches[link.patch], link).closing;
   }
 
   // Whether a joint that is no kink closes by enough to count where the body is as flat as it is there: it
   // hides the square of its angle, over the curvature.
   bool may_hide_valley(int patch, int edge) const {
     const EdgeLink& link = shape_.links[patch][edge];
-    if (link.collapsed || link.patch < 0) return false;
-    const double angle = bound_kink(shape_.patches[patch], edge, shape_.patches[link.patch], link).closing;
+    if (link.collapsed || link.patch < 0 || !(link.kink_bound > kNoValley)) return false;
+    const double angle = closing(patch, edge);
     if (!(angle > kNoValley)) return false;
     double radius = 0;
     for (int k = 0; k <= kNormalJointSamples; ++k)

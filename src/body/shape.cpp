@@ -305,8 +305,8 @@ void check_gyration(const Mat3& given) {
 }
 
 // Mass can't be further from the centre of mass than the body reaches.
-void check_size(const Mat3& given, double radius) {
-  const double most = principal_frame(given).moments[2], allowed = radius * radius;
+void check_size(const Shape& s) {
+  const double most = s.principal_gyration[2], allowed = s.bounding_radius * s.bounding_radius;
   if (most > allowed * (1 + kGivenExcess))
     throw ShapeError("gyration is that of a larger body: its largest eigenvalue is " + number(most) +
                      "; it must not exceed the square of the bounding radius, " + number(allowed));
@@ -345,7 +345,7 @@ void build(Draft& draft, const std::optional<Mat3>& gyration) {
   if (gyration) check_gyration(*gyration);
   set_gyration(draft.shape, gyration ? *gyration : Mat3(draft.shape.mass.inertia / draft.shape.mass.volume));
   measure(draft);
-  if (gyration) check_size(*gyration, draft.shape.bounding_radius);
+  if (gyration) check_size(draft.shape);
   draft.shape.stamp = content_stamp(draft.shape);
   draft.shape.flats = find_flat_features(draft.shape);
 }

@@ -558,7 +558,7 @@ class Bounder {
     const CellBounds& b = leaf.bounds;
     if (b.seen_min > 0) out_.seen_min = std::min(out_.seen_min, b.seen_min);
     if (b.seen_curvature > 0) out_.seen_max = std::max(out_.seen_max, b.seen_max);
-    hollow_ |= is_hollow(leaf);
+    hollow_ |= is_hollow(b, shape_.bounding_radius);
     see_rate(leaf);
   }
 
@@ -614,7 +614,7 @@ class Bounder {
       if (hidden > kLeastHollow) open[!has_bounds(leaves[k])].push({hidden, k});
     };
     const auto note = [&](const Leaf& leaf) {
-      if (is_hollow(leaf)) out_.hollows.push_back(leaf);
+      if (is_hollow(leaf.bounds, shape_.bounding_radius)) out_.hollows.push_back(leaf);
     };
     for (int k = 0; k < static_cast<int>(leaves.size()); ++k)
       if (left[leaves[k].cell.patch]) {
@@ -632,18 +632,14 @@ class Bounder {
       while (hidden_hollow(leaves[k]) > kLeastHollow) {
         leaves.push_back(halve_either_way(&leaves[k]));
         const int other = static_cast<int>(leaves.size()) - 1;
-        const bool turn = hidden_hollow(leaves[other]) > hidden_hollow(leaves[k]);
         note(leaves[k]);
         note(leaves[other]);
-        enter(turn ? k : other);
-        if (turn) k = other;
+        const bool worse = hidden_hollow(leaves[other]) > hidden_hollow(leaves[k]);
+        enter(worse ? k : other);
+        if (worse) k = other;
       }
     }
   }
-  bool is_hollow(const Leaf& leaf) const {
-    return leaf.bounds.seen_curvature < -kCurvatureNoise / shape_.bounding_radius;
-  }
-
   // The way that leaves less hidden, or across. *leaf becomes the first half; returns the second.
   Leaf halve_either_way(Leaf* leaf) {
     const int p = leaf->cell.patch;
@@ -776,6 +772,10 @@ LocalRate rate_near(const PatchRate& patch, const SurfacePoint& at, Alike alike)
 bool is_flat(const CellBounds& b, double size) {
   const double noise = kCurvatureNoise / size;
   return b.regular && !b.convex && b.least_curvature >= -noise && b.seen_curvature <= noise;
+}
+
+bool is_hollow(const CellBounds& b, double size) {
+  return b.seen_curvature < -kCurvatureNoise / size;
 }
 
 SurfaceBounds bound_surface(const Shape& shape, bool sphere, Wanted wanted) {

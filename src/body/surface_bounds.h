@@ -38,6 +38,8 @@ SurfaceBounds bound_surface(const Shape& shape, bool sphere = false, Wanted want
 
 // Whether a leaf has no negative curvature beyond round-off, though not all are positive: flat or ruled.
 bool is_flat(const CellBounds& bounds, double size);
+// Whether one was seen to have negative curvature beyond that.
+bool is_hollow(const CellBounds& bounds, double size);
 
 // Halves the leaves further until the normals of each are within `round` (rad) of its axis, within `flat`
 // where it is not convex, and its largest radius within the factor `spread` of one that occurs there, `cells`

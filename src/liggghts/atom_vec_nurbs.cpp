@@ -48,7 +48,10 @@ Quat to_quat(const double* q) {
 }
 
 Quat normalised(const Quat& q) {
-  return std::abs(q.squaredNorm() - 1) <= kUnitTolerance ? q : q.normalized();
+  const double length2 = q.squaredNorm();
+  if (std::abs(length2 - 1) <= kUnitTolerance) return q;
+  if (std::isnormal(length2)) return q.normalized();
+  return Quat(q.coeffs() / q.coeffs().stableNorm());  // components whose squares are out of range
 }
 
 // Reads a whole word as a finite number.
@@ -740,10 +743,7 @@ void AtomVecNurbs::data_atom(double* coord, tagint image, char** values) {
   for (int k = 0; k < 4; ++k)
     if (!parse(values[8 + k], q[k]))
       fail(std::string("quaternion component ") + values[8 + k] + " must be a number");
-  const double length = to_quat(q).coeffs().stableNorm();
-  if (!(length > 0)) fail("quaternion 0 0 0 0 must have a length > 0");
-  if (!std::isnormal(to_quat(q).squaredNorm()))
-    for (double& component : q) component /= length;
+  if (!(to_quat(q).coeffs().stableNorm() > 0)) fail("quaternion 0 0 0 0 must have a length > 0");
 
   const int i = append_atom(type, coord, image);
   tag_[i] = tag;

@@ -52,29 +52,21 @@ bool is_oriented(LAMMPS* lmp, const Fix& fix, int narg, char** arg) {
   return false;
 }
 
-// Before the particles of this step are drawn.
-void tell_oriented(const Atom& atom, bool oriented) {
-  if (auto* bodies = dynamic_cast<AtomVecNurbs*>(atom.avec)) bodies->orient_insertion(oriented);
-}
-
 }  // namespace
 
-FixInsertPackNurbs::FixInsertPackNurbs(LAMMPS* lmp, int narg, char** arg)
-    : FixInsertPack(lmp, narg, arg), oriented_(is_oriented(lmp, *this, narg, arg)) {}
-FixInsertRateRegionNurbs::FixInsertRateRegionNurbs(LAMMPS* lmp, int narg, char** arg)
-    : FixInsertRateRegion(lmp, narg, arg), oriented_(is_oriented(lmp, *this, narg, arg)) {}
-FixInsertStreamNurbs::FixInsertStreamNurbs(LAMMPS* lmp, int narg, char** arg)
-    : FixInsertStream(lmp, narg, arg), oriented_(is_oriented(lmp, *this, narg, arg)) {}
+template <class Host>
+OrientedInsert<Host>::OrientedInsert(LAMMPS* lmp, int narg, char** arg)
+    : Host(lmp, narg, arg), oriented_(is_oriented(lmp, *this, narg, arg)) {}
 
-int FixInsertRateRegionNurbs::calc_ninsert_this() {
-  tell_oriented(*atom, oriented_);
-  return FixInsertRateRegion::calc_ninsert_this();
+template <class Host>
+int OrientedInsert<Host>::calc_ninsert_this() {
+  if (auto* bodies = dynamic_cast<AtomVecNurbs*>(this->atom->avec)) bodies->orient_insertion(oriented_);
+  return Host::calc_ninsert_this();
 }
 
-int FixInsertStreamNurbs::calc_ninsert_this() {
-  tell_oriented(*atom, oriented_);
-  return FixInsertStream::calc_ninsert_this();
-}
+template class OrientedInsert<FixInsertPack>;
+template class OrientedInsert<FixInsertRateRegion>;
+template class OrientedInsert<FixInsertStream>;
 
 void FixInsertPackNurbs::calc_insertion_properties() {
   if (ins_region != nullptr && all_in_flag && holds_nurbs(*atom))
@@ -90,14 +82,13 @@ void FixInsertRateRegionNurbs::calc_insertion_properties() {
 
 // For the time of the host's count every radius is that of the sphere of the particle's volume.
 int FixInsertPackNurbs::calc_ninsert_this() {
-  tell_oriented(*atom, oriented_);
-  if (!holds_nurbs(*atom)) return FixInsertPack::calc_ninsert_this();
+  if (!holds_nurbs(*atom)) return OrientedInsert::calc_ninsert_this();
   std::vector<double> radius(atom->nlocal + 1);
   for (int i = 0; i < atom->nlocal; ++i)
     radius[i] = std::cbrt(3 * atom->rmass[i] / (4 * M_PI * atom->density[i]));
   double* const bounding = atom->radius;
   atom->radius = radius.data();
-  const int count = FixInsertPack::calc_ninsert_this();
+  const int count = OrientedInsert::calc_ninsert_this();
   atom->radius = bounding;
   return count;
 }

@@ -19,40 +19,40 @@ FixStyle(insert/pack,FixInsertPackNurbs) FixStyle(insert/rate/region,FixInsertRa
 
 namespace LAMMPS_NS {
 
-class FixInsertPackNurbs : public FixInsertPack {
+// One of the host's, that tells templates before it draws particles whether it orients them itself.
+template <class Host>
+class OrientedInsert : public Host {
  public:
-  FixInsertPackNurbs(LAMMPS* lmp, int narg, char** arg);
+  OrientedInsert(LAMMPS* lmp, int narg, char** arg);
 
  protected:
-  void calc_insertion_properties() override;
   int calc_ninsert_this() override;
 
  private:
   bool oriented_;  // `orientation constant` is given
 };
 
-class FixInsertRateRegionNurbs : public FixInsertRateRegion {
+class FixInsertPackNurbs : public OrientedInsert<FixInsertPack> {
  public:
-  FixInsertRateRegionNurbs(LAMMPS* lmp, int narg, char** arg);
+  using OrientedInsert::OrientedInsert;
 
  protected:
   void calc_insertion_properties() override;
   int calc_ninsert_this() override;
-
- private:
-  bool oriented_;
 };
 
-class FixInsertStreamNurbs : public FixInsertStream {
+class FixInsertRateRegionNurbs : public OrientedInsert<FixInsertRateRegion> {
  public:
-  FixInsertStreamNurbs(LAMMPS* lmp, int narg, char** arg);
-  void post_create() override;
+  using OrientedInsert::OrientedInsert;
 
  protected:
-  int calc_ninsert_this() override;
+  void calc_insertion_properties() override;
+};
 
- private:
-  bool oriented_;
+class FixInsertStreamNurbs : public OrientedInsert<FixInsertStream> {
+ public:
+  using OrientedInsert::OrientedInsert;
+  void post_create() override;
 };
 
 }  // namespace LAMMPS_NS

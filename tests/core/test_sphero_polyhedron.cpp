@@ -12,8 +12,10 @@
 #include "shapes/primitives.h"
 #include "shapes/revolved.h"
 #include "shapes/rounded_polyhedron.h"
+#include "support/bodies.h"
 #include "support/cases.h"
 #include "support/least_overlap.h"
+#include "support/pairs.h"
 #include "support/random.h"
 
 namespace nurbs {
@@ -199,6 +201,21 @@ TEST(BallHull, of_a_ball_and_a_tip) {
 
 // Against supports that know nothing of balls: the overlap along the normal is the one found, and no
 // direction of thousands, nor the best of them refined, has less.
+ContactResult expect_least_overlap(const Particle& a, const Particle& b, Random& random) {
+  static const std::vector<Vec3> spiral = test::spiral(1500);
+  double memory[kPairMemorySize] = {0};
+  ContactResult r = find_contact(a, b, ContactSettings(), memory);
+  EXPECT_EQ(r.status, Status::converged);
+  const auto overlap = [&](const Vec3& d) { return test::overlap_along(a, b, d); };
+  const double size = std::min(a.scale * a.shape->bounding_radius, b.scale * b.shape->bounding_radius);
+  EXPECT_NEAR(overlap(r.normal), -r.gap, 1e-9 * size);
+  EXPECT_GE(test::least_overlap(overlap, spiral, test::Compass(), random), -r.gap - 1e-9 * size);
+  EXPECT_NEAR(r.normal.dot(r.point_b - r.point_a), r.gap, 1e-12 * size + 1e-12);
+  const double h = a.scale * find_hull_support(*a.shape, a.q.conjugate() * r.normal).h;
+  EXPECT_NEAR(r.normal.dot(r.point_a), h, 1e-9 * size);
+  return r;
+}
+
 TEST(BallHull, contacts_of_two_are_least_overlaps) {
   Random random(8);
   const std::vector<Body> bodies = {tapered(1, 0.5, 1.5),
@@ -208,7 +225,6 @@ TEST(BallHull, contacts_of_two_are_least_overlaps) {
                                     make_shape("capsule", capsule(0.5, 2)),
                                     make_shape("ball", exact_ellipsoid({0.7, 0.7, 0.7})),
                                     rounded("tetrahedron", 0.1)};
-  const std::vector<Vec3> spiral = test::spiral(1500);
   for (int k = 0; k < 240; ++k) {
     const Shape &sa = *bodies[random.below(4)], &sb = k % 8 == 1 ? sa : *bodies[random.below(7)];
     Particle a{&sa, 1, Vec3::Zero(), random.turn()},
@@ -219,30 +235,13 @@ TEST(BallHull, contacts_of_two_are_least_overlaps) {
     const Vec3 centre_a = k % 3 ? Vec3(a.q * -sa.mass.center) : Vec3(Vec3::Zero()),
                centre_b = k % 3 ? Vec3(b.scale * (b.q * -sb.mass.center)) : Vec3(Vec3::Zero());
     b.x = centre_a - centre_b + off[k % 8] * random.direction();
-    double memory[kPairMemorySize] = {0};
-    const ContactResult r = find_contact(a, b, ContactSettings(), memory);
-    ASSERT_EQ(r.status, Status::converged) << k;
-    const auto overlap = [&](const Vec3& d) {
-      return find_hull_support(sa, a.q.conjugate() * d).h +
-             b.scale * find_hull_support(sb, b.q.conjugate() * -d).h - d.dot(b.x);
-    };
+    SCOPED_TRACE(k);
+    const ContactResult r = expect_least_overlap(a, b, random);
     const double size = std::min(sa.bounding_radius, b.scale * sb.bounding_radius);
-    EXPECT_NEAR(overlap(r.normal), -r.gap, 1e-9 * size) << k;
-    EXPECT_GE(test::least_overlap(overlap, spiral, test::Compass(), random), -r.gap - 1e-9 * size) << k;
-    EXPECT_NEAR(r.normal.dot(r.point_b - r.point_a), r.gap, 1e-12 * size + 1e-12) << k;
-    EXPECT_NEAR(r.normal.dot(r.point_a), find_hull_support(sa, a.q.conjugate() * r.normal).h, 1e-9 * size)
-        << k;
     EXPECT_LT((r.point_b - r.point_a).cross(r.normal).norm(), 1e-5 * size) << k << " gap " << r.gap;
   }
 }
 
-// Half a ball on a cylinder with a flat base, the ball's centre at the origin.
-Body bullet(double length) {
-  const double c = std::sqrt(0.5);
-  return make_shape("bullet", revolve({{Vec2(0, -length), Vec2::Zero(), Vec2(1, -length), 0},
-                                       {Vec2(1, -length), Vec2::Zero(), Vec2(1, 0), 0},
-                                       {Vec2(1, 0), Vec2(1, 1), Vec2(0, 1), c}}));
-}
 // A ball cut flat below.
 Body cut_ball(double depth) {
   const double rim = std::sqrt(1 - depth * depth), turn = std::asin(depth) + 0.5 * M_PI,
@@ -260,8 +259,8 @@ TEST(InnerBalls, are_found_and_lie_inside) {
   const struct {
     Body body;
     std::vector<double> heights;  // of the centres, of balls of radius 1
-  } cases[] = {{bullet(2), {0, -1}},
-               {bullet(0.5), {}},  // the ball reaches through the base
+  } cases[] = {{make_shape("bullet", test::bullet(2)), {0, -1}},
+               {make_shape("stub", test::bullet(0.5)), {}},  // the ball reaches through the base
                {make_shape("egg", egg(1, 1, 1.4)), {0}},
                {make_shape("egg, pointed below", egg(1, 1.4, 1)), {0}},
                {make_shape("flat egg", egg(1, 1, 0.9)), {}},
@@ -287,14 +286,13 @@ TEST(InnerBalls, are_found_and_lie_inside) {
 // closes.
 TEST(InnerBalls, contacts_about_one_centre_are_least_overlaps) {
   Random random(9);
-  const std::vector<Body> bodies = {bullet(2), make_shape("egg", egg(1, 1, 1.4)), tapered(1, 0, 2.5),
-                                    make_shape("ball", exact_ellipsoid({1, 1, 1}))};
+  const std::vector<Body> bodies = {make_shape("bullet", test::bullet(2)), make_shape("egg", egg(1, 1, 1.4)),
+                                    tapered(1, 0, 2.5), make_shape("ball", exact_ellipsoid({1, 1, 1}))};
   const auto centre = [](const Shape& s) {
     return s.inner_balls.found() ? s.inner_balls.centres[0]
            : s.ball_hull.found() ? s.ball_hull.centres[s.ball_hull.radii[0] > 0 ? 0 : 1]
                                  : Vec3(Vec3::Zero());
   };
-  const std::vector<Vec3> spiral = test::spiral(1500);
   for (int k = 0; k < 320; ++k) {
     const Shape &sa = *bodies[k % 4], &sb = *bodies[k / 4 % 4];
     Particle a{&sa, 1, Vec3::Zero(), random.turn()},
@@ -304,22 +302,12 @@ TEST(InnerBalls, contacts_about_one_centre_are_least_overlaps) {
     const int which = k / 16 % (eggs ? 4 : 10);
     b.x = a.q * centre(sa) - b.scale * (b.q * centre(sb)) +
           off[which] * std::min(1.0, b.scale) * random.direction();
-    double memory[kPairMemorySize] = {0};
-    const ContactResult r = find_contact(a, b, ContactSettings(), memory);
-    ASSERT_EQ(r.status, Status::converged) << k;
-    const auto overlap = [&](const Vec3& d) {
-      return find_hull_support(sa, a.q.conjugate() * d).h +
-             b.scale * find_hull_support(sb, b.q.conjugate() * -d).h - d.dot(b.x);
-    };
+    SCOPED_TRACE(k);
+    const ContactResult r = expect_least_overlap(a, b, random);
     const double size = std::min(sa.bounding_radius, b.scale * sb.bounding_radius);
-    EXPECT_NEAR(overlap(r.normal), -r.gap, 1e-9 * size) << k;
-    EXPECT_GE(test::least_overlap(overlap, spiral, test::Compass(), random), -r.gap - 1e-9 * size) << k;
     if (off[which] < 1e-9) {
       EXPECT_NEAR(-r.gap, 1 + b.scale, 2e-9 * size) << k;
     }
-    EXPECT_NEAR(r.normal.dot(r.point_b - r.point_a), r.gap, 1e-12 * size + 1e-12) << k;
-    EXPECT_NEAR(r.normal.dot(r.point_a), find_hull_support(sa, a.q.conjugate() * r.normal).h, 1e-9 * size)
-        << k;
   }
 }
 

@@ -8,6 +8,7 @@
 #include "body/shape.h"
 #include "body/support.h"
 #include "shapes/primitives.h"
+#include "shapes/revolved.h"
 #include "support/as_surface.h"
 
 namespace nurbs::test {
@@ -45,6 +46,13 @@ inline ShapePointer polar() {  // one patch, two poles and a seam
 inline ShapePointer cuboid() {
   static const ShapePointer s = make_shape("cuboid", box(Vec3(1, 0.8, 0.6)));
   return s;
+}
+
+// Half a ball of radius 1 on a cylinder with a flat base, the ball's centre at the origin.
+inline std::vector<NurbsSurface> bullet(double length) {
+  return revolve({{Vec2(0, -length), Vec2::Zero(), Vec2(1, -length), 0},
+                  {Vec2(1, -length), Vec2::Zero(), Vec2(1, 0), 0},
+                  {Vec2(1, 0), Vec2(1, 1), Vec2(0, 1), std::sqrt(0.5)}});
 }
 
 inline std::vector<ShapePointer> smooth_shapes() {

@@ -69,10 +69,6 @@ std::function<Vec3(const Vec3&)> block_support(const Top& top, const Best& best,
   };
 }
 
-}  // namespace
-
-namespace {
-
 // f(x) = -bend t^4 / 12 + bend w^2 t^2 / 2 + slope t, t = x - x0, from `low` to 1: a groove between t = -w
 // and w.
 struct Groove {

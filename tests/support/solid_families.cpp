@@ -7,6 +7,7 @@
 #include <map>
 
 #include "shapes/revolved.h"
+#include "support/bodies.h"
 #include "support/hidden_dents.h"
 #include "support/least_overlap.h"
 
@@ -76,6 +77,13 @@ Truth search_least(const PairCase& c, const Solid& a, const Solid& b, Random& ra
   return truth;
 }
 
+// p(d) of two placed bodies, by their closed forms; the bodies must outlive it.
+std::function<double(const Vec3&)> overlap_of(const Solid& a, const Solid& b, const PairCase& c) {
+  return [&a, &b, ca = c.a, cb = c.b](const Vec3& d) {
+    return d.dot(support_of(a, ca, d)) - d.dot(support_of(b, cb, -d)) - d.dot(cb.x - ca.x);
+  };
+}
+
 // Supports along a direction, `gap` apart along it; overlapping ones are searched.
 PairCase place(Random& random, const Solid& a, const Solid& b, double scale, double least, double most) {
   PairCase c;
@@ -89,9 +97,7 @@ PairCase place(Random& random, const Solid& a, const Solid& b, double scale, dou
   const double size = std::min(a.shape->bounding_radius, scale * b.shape->bounding_radius);
   const double gap = random.sign() * size * random.log_uniform(least, most);
   c.b.x = support_of(a, c.a, n) - support_of(b, c.b, -n) + gap * n;
-  c.overlap = [&a, &b, ca = c.a, cb = c.b](const Vec3& d) {
-    return d.dot(support_of(a, ca, d)) - d.dot(support_of(b, cb, -d)) - d.dot(cb.x - ca.x);
-  };
+  c.overlap = overlap_of(a, b, c);
   if (gap > 0) {
     c.truth.gap = gap;
     c.truth.has_normal = true;
@@ -169,9 +175,7 @@ PairCase hidden_dent(Random& random, long) {
   // Of a ball whose centre is outside the hull the gap's sign makes no difference: the nearest point is
   // known.
   c.b.x = support_of(a, c.a, n) - support_of(b, c.b, -n) + gap * n;
-  c.overlap = [&a, &b, ca = c.a, cb = c.b](const Vec3& d) {
-    return d.dot(support_of(a, ca, d)) - d.dot(support_of(b, cb, -d)) - d.dot(cb.x - ca.x);
-  };
+  c.overlap = overlap_of(a, b, c);
   c.truth.gap = gap;
   c.truth.has_normal = true;
   c.truth.normal = n;
@@ -182,10 +186,6 @@ PairCase hidden_dent(Random& random, long) {
 const std::vector<Solid>& balls_in_part() {
   static const std::vector<Solid> all = [] {
     Random random(1011);
-    const double c = std::sqrt(0.5);
-    const auto bullet = revolve({{Vec2(0, -1.5), Vec2::Zero(), Vec2(1, -1.5), 0},
-                                 {Vec2(1, -1.5), Vec2::Zero(), Vec2(1, 0), 0},
-                                 {Vec2(1, 0), Vec2(1, 1), Vec2(0, 1), c}});
     const auto round = [](const Vec3& d, double tall, double low) {  // a ball above, more below
       const double across = std::hypot(d[0], d[1]);
       if (d[2] >= 0) return Vec3(d.normalized());
@@ -196,8 +196,8 @@ const std::vector<Solid>& balls_in_part() {
     };
     std::vector<Solid> made = {unit_ball()};
     for (int k = 0; k < 2; ++k) {
-      made.push_back(
-          test::turned_solid(random, "bullet", bullet, [=](const Vec3& d) { return round(d, 1, 1.5); }));
+      made.push_back(test::turned_solid(random, "bullet", test::bullet(1.5),
+                                        [=](const Vec3& d) { return round(d, 1, 1.5); }));
       made.push_back(
           test::turned_solid(random, "egg", egg(1, 1.4, 1), [=](const Vec3& d) { return round(d, 1.4, 0); }));
     }
@@ -214,9 +214,7 @@ PairCase one_centre(Random& random, long) {
   c.a = {a.shape.get(), 1, Vec3::Zero(), random.turn()};
   c.b = {b.shape.get(), random.log_uniform(0.2, 5), Vec3::Zero(), random.turn()};
   c.b.x = c.a.q * -a.shape->mass.center - c.b.scale * (c.b.q * -b.shape->mass.center);
-  c.overlap = [&a, &b, ca = c.a, cb = c.b](const Vec3& d) {
-    return d.dot(support_of(a, ca, d)) - d.dot(support_of(b, cb, -d)) - d.dot(cb.x - ca.x);
-  };
+  c.overlap = overlap_of(a, b, c);
   c.truth.gap = -(1 + c.b.scale);
   return c;
 }
