@@ -416,7 +416,8 @@ Meridian make_meridian(const std::vector<BezierPatch>& patches, const Revolution
     }
     m.pieces.push_back(f.piece);
   }
-  if (m.pieces.empty() || !(m.error <= kMeridianLack * size)) return {};
+  if (m.pieces.empty() || !(m.error <= kMeridianError * size)) return {};
+  m.exact = m.error <= kMeridianLack * size;
   for (int k = 0; k <= kMeridianStarts; ++k) {
     const double at = 2.0 * k / kMeridianStarts - 1, dr = 1 - std::abs(at), length = std::hypot(dr, at);
     Meridian::Place best;

@@ -40,6 +40,7 @@ struct Meridian {
   Mat3 axes = Mat3::Identity();  // rows: two across the axis, and the axis
   Vec3 point = Vec3::Zero();     // on it
   double error = 0;              // by how much the body's support may exceed that of the above
+  bool exact = false;            // that is round-off
 
   bool empty() const { return pieces.empty(); }
 };
@@ -60,12 +61,13 @@ void archive(Archive& a, Meridian::Place& s) {
 }
 template <class Archive>
 void archive(Archive& a, Meridian& s) {
-  auto& [pieces, sectors, starts, sector_of, axes, point, error] = s;
-  a(pieces, sectors, starts, sector_of, axes, point, error);
+  auto& [pieces, sectors, starts, sector_of, axes, point, error, exact] = s;
+  a(pieces, sectors, starts, sector_of, axes, point, error, exact);
 }
 
 // Of a body of revolution whose joints meet to round-off. `size`: bounding radius. Patches in a plane square
-// to the axis need not be such products: the rest bounds them.
+// to the axis need not be such products: the rest bounds them. Few digits may keep a body off it by
+// kMeridianError: it then serves where that is little of what is asked for.
 Meridian make_meridian(const std::vector<BezierPatch>& patches, const Revolution& revolution, double size);
 
 // A point of the profile, in the half plane of its axis, lengths of the shape.

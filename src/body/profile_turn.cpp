@@ -55,6 +55,7 @@ ProfileTurn profile_turn(const Meridian& meridian, const Meridian::Piece& piece,
 std::vector<bool> bulging_patches(const Meridian& meridian, const std::vector<BezierPatch>& patches,
                                   double size) {
   std::vector<bool> bulging(patches.size(), false);
+  if (!meridian.exact) return bulging;
   for (const Meridian::Piece& piece : meridian.pieces) {
     const bool all = bulges(piece, profile_turn(meridian, piece, patches, size), size);
     for (int k = piece.first_sector; k < piece.first_sector + piece.sectors; ++k)

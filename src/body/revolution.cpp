@@ -77,7 +77,7 @@ double off_arcs(const BezierPatch& patch, bool arcs_in_u, const Revolution& abou
   std::vector<Coordinates> lines;
   Real moved = 0;
   for (int i = 0; i <= n; ++i) {
-    lines.emplace_back(line_of(patch, arcs_in_u, i), axes, kArcRoundoff * size);
+    lines.emplace_back(line_of(patch, arcs_in_u, i), axes, kArcError * size);
     moved = std::max(moved, lines.back().moved);
   }
   const Coordinates& first = lines[0];

@@ -37,7 +37,7 @@ constexpr double kSharp = 0.02;  // ... and balls that serve; smaller ones are l
 double local_ball(const Shape& shape, const SurfacePoint& at) {
   if (shape.rates.empty()) return 0;  // while the body is made
   const Meridian& m = shape.meridian;
-  const int sector = m.empty() ? -1 : m.sector_of[at.patch];
+  const int sector = m.exact ? m.sector_of[at.patch] : -1;
   const Alike alike = sector < 0                    ? Alike::none
                       : m.sectors[sector].arcs_in_u ? Alike::along_u
                                                     : Alike::along_v;

@@ -6,6 +6,7 @@
 
 #include "body/bounds.h"
 #include "body/connectivity.h"
+#include "body/revolution.h"
 #include "body/rounding.h"
 #include "body/shape.h"
 
@@ -13,17 +14,19 @@ namespace nurbs {
 namespace {
 
 constexpr int kMostPoints = 64;
-constexpr double kMostError = 5e-11;   // of the bounding radius
-constexpr double kMostKink = 1e-6;     // rad
-constexpr double kNearCentre = 1e-3;   // of the radius: further ones are another point's
-constexpr double kOnBall = 1e-13;      // of the bounding radius: off a ball
-constexpr double kSameWeight = 1e-13;  // relative
-constexpr double kSamePoint = 1e-12;   // of the bounding radius: of corners
-constexpr double kTwoNormals = 1e-3;   // rad: closer ones give no radius
-constexpr int kHullSamples = 9;        // per patch and parameter
-constexpr double kInside = 1e-12;      // of a ball's radius, that it may lie outside
-constexpr int kMoves = 40;             // halvings of how far a ball may be moved
-constexpr double kMostOff = 1e-12;     // of the bounding radius: supports of the balls' hull and the body's
+constexpr double kMostError = 5e-11;  // of the bounding radius
+constexpr double kMostKink = 1e-6;    // rad
+constexpr double kNearCentre = 1e-3;  // of the radius: further ones are another point's
+constexpr double kExact = 1e-13;      // of the bounding radius: off balls, planes and lines, round-off
+constexpr double kNear = 3e-11;       // ... and few digits
+constexpr double kSamePoint = 1e-12;  // of the bounding radius: of corners
+constexpr double kTwoNormals = 1e-3;  // rad: closer ones give no radius
+constexpr int kHullSamples = 9;       // per patch and parameter
+constexpr double kInside = 1e-12;     // of a ball's radius, that it may lie outside
+constexpr double kWithin = 2;         // times what its part is off it: so much smaller ones lie inside
+constexpr double kShared = 3;         // planes end in lines, and these in balls: each may be off
+constexpr int kMoves = 40;            // halvings of how far a ball may be moved
+constexpr double kMostOff = 1e-12;    // of the bounding radius: supports of the balls' hull and the body's
 
 struct Sample {
   Vec3 x, n;
@@ -60,36 +63,39 @@ Curved curved(const BezierPatch& patch) {
   return out;
 }
 
-// Whether the lines of one parameter (v, or u) are straight from edge to edge: control points divide them all
-// alike, with weights in the same proportions.
-bool is_ruled(const BezierPatch& patch, bool along_v, double size) {
+// How far the lines of one parameter (v, or u) are from straight ones from edge to edge that control points
+// divide alike, with weights in the same proportions: a length, of no patch that large infinite.
+double off_lines(const BezierPatch& patch, bool along_v, double size) {
   const int lines = along_v ? patch.degree_u : patch.degree_v,
             last = along_v ? patch.degree_v : patch.degree_u;
   const auto point = [&](int line, int k) -> const Vec4& {
     return along_v ? patch.point(line, k) : patch.point(k, line);
   };
-  if (last == 1) return true;
+  if (last == 1) return 0;
   const auto at = [&](int line, int k) -> Vec3 { return point(line, k).head<3>() / point(line, k)[3]; };
   int longest = 0;
   for (int i = 1; i <= lines; ++i)
     if ((at(i, last) - at(i, 0)).norm() > (at(longest, last) - at(longest, 0)).norm()) longest = i;
   const Vec3 along = at(longest, last) - at(longest, 0);
+  double off = 0;
   for (int k = 1; k < last; ++k) {
     const double share = along.dot(at(longest, k) - at(longest, 0)) / along.squaredNorm();
     const double weight = point(longest, k)[3] / point(longest, 0)[3];
-    if (!(share >= 0 && share <= 1)) return false;
+    if (!(share >= 0 && share <= 1)) return kFarAway;
     for (int i = 0; i <= lines; ++i) {
       const Vec3 there = (1 - share) * at(i, 0) + share * at(i, last);
-      if (!((at(i, k) - there).norm() <= kOnBall * size)) return false;
-      if (!(std::abs(point(i, k)[3] / point(i, 0)[3] - weight) <= kSameWeight * weight)) return false;
+      off = std::max(off, (at(i, k) - there).norm());
+      off = std::max(off, std::abs(point(i, k)[3] / point(i, 0)[3] / weight - 1) * size);
     }
   }
-  return true;
+  return off;
 }
 
 class Finder {
  public:
-  explicit Finder(const Shape& shape) : shape_(shape), on_ball_(shape.patches.size(), false) {}
+  // `near`: of the bounding radius, what patches may be off balls, planes and straight lines.
+  Finder(const Shape& shape, double near)
+      : shape_(shape), near_(near * shape.bounding_radius), on_ball_(shape.patches.size(), false) {}
 
   SpheroPolyhedron polyhedron() const {
     SpheroPolyhedron out;
@@ -110,23 +116,26 @@ class Finder {
   }
 
   SpheroPolyhedron rounded() {
-    out_.error = shape_.concavity + kJointRoundoff * shape_.bounding_radius;
     if (!is_smooth()) return {};
     take_radius();
     if (!(out_.radius > 0) || !balls() || out_.points.empty() || !all_between()) return {};
-    out_.error += 0.5 * kMostKink * kMostKink * out_.radius;
+    out_.error = error();
     if (!(out_.error <= kMostError * shape_.bounding_radius)) return {};
-    return out_;
+    if (is_exact()) {
+      out_.error += 0.5 * kMostKink * kMostKink * out_.radius;
+      return out_;
+    }
+    const auto held = [&](const Vec3& point) { return is_inside(point, out_.radius - out_.error); };
+    return std::all_of(out_.points.begin(), out_.points.end(), held) ? out_ : SpheroPolyhedron();
   }
 
   BallHull hull() {
     BallHull out;
-    out.error = shape_.concavity + kJointRoundoff * shape_.bounding_radius;
     if (!is_smooth(true) || !all_balls(&out) || !all_tips(&out)) return {};
     if (out.centres.size() < 2 || !all_between()) return {};
     const double off = off_hull(out);
-    if (!(off <= kMostOff * shape_.bounding_radius)) return {};
-    out.error += off;
+    if (!(off <= std::max(kMostOff * shape_.bounding_radius, off_))) return {};
+    out.error = error() + off;
     return out.error <= kMostError * shape_.bounding_radius ? out : BallHull();
   }
 
@@ -135,20 +144,23 @@ class Finder {
     all_balls(&on);  // as many as there is room for
     for (size_t k = 0; k < on.centres.size() && out.centres.size() < kMostBalls; ++k) {
       const Vec3& centre = on.centres[k];
-      const double radius = on.radii[k];
+      const double radius = on.radii[k] - (is_exact() ? 0 : kWithin * off_);
       if (!is_inside(centre, radius)) continue;
       const auto take = [&](const Vec3& at) {
         out.centres.push_back(at);
         out.radii.push_back(radius);
       };
       take(centre);
-      out.error = std::max(out.error, (kOnBall + kInside) * shape_.bounding_radius);
+      out.error = std::max(out.error, (kExact + kInside) * shape_.bounding_radius);
       for (const double sign : {-1.0, 1.0}) {
         if (!shape_.revolution.found || out.centres.size() == kMostBalls) break;
         const Vec3 along = sign * shape_.revolution.axis;
         const auto holds = [&](double way) { return is_inside(centre + way * along, radius); };
-        double inside = 0, outside = 2 * shape_.bounding_radius;
-        if (!holds(kNearCentre * radius)) continue;
+        // Up to the highest point seen: what the surface leaves alone further out may lie outside of the
+        // body.
+        double inside = 0, outside = highest(along) - along.dot(centre);
+        if (!(radius > shape_.concavity && outside > kNearCentre * radius && holds(kNearCentre * radius)))
+          continue;
         for (int step = 0; step < kMoves; ++step) {
           const double way = 0.5 * (inside + outside);
           (holds(way) ? inside : outside) = way;
@@ -160,10 +172,27 @@ class Finder {
   }
 
  private:
+  bool is_exact() const { return off_ <= kExact * shape_.bounding_radius && shape_.joint_slack == 0; }
+  // What the hull of balls that patches were found on, or between, and the body may be apart.
+  double error() const {
+    const double apart = shape_.concavity + kJointRoundoff * shape_.bounding_radius;
+    return is_exact() ? apart + off_balls_ : std::max(apart, kShared * off_ + shape_.joint_slack);
+  }
+
+  // That the surface leaves a ball alone, which so lies inside of the body if its centre does.
   bool is_inside(const Vec3& centre, double radius) const {
     return std::all_of(shape_.patches.begin(), shape_.patches.end(), [&](const BezierPatch& patch) {
       return lies_outside_unit_ball(seen_from(patch, centre, radius), kInside);
     });
+  }
+
+  // Of the patches' corners along unit d.
+  double highest(const Vec3& d) const {
+    double most = -kFarAway;
+    for (const BezierPatch& patch : shape_.patches)
+      for (const double u : {0.0, 1.0})
+        for (const double v : {0.0, 1.0}) most = std::max(most, d.dot(evaluate0(patch, u, v)));
+    return most;
   }
 
   // But for tips of cones, if those are let be.
@@ -173,7 +202,7 @@ class Finder {
         if (!(std::abs(link.kink) <= kMostKink || (with_tips && link.collapsed))) return false;
     return true;
   }
-  bool all_between() const {
+  bool all_between() {
     for (int k = 0; k < static_cast<int>(shape_.patches.size()); ++k)
       if (!on_ball_[k] && !is_between(k)) return false;
     return true;
@@ -193,7 +222,7 @@ class Finder {
       const BezierPatch& patch = shape_.patches[k];
       const auto holds = [&](const Vec3& centre, double radius) {
         return std::abs((sample(patch, 0.5, 0.5).x - centre).norm() - radius) <= kNearCentre * radius &&
-               is_on_ball(off_ball(patch, centre, radius), radius);
+               is_small(off_ball(patch, centre, radius) * radius);
       };
       for (size_t i = 0; i < out->centres.size() && !on_ball_[k]; ++i)
         on_ball_[k] = holds(out->centres[i], out->radii[i]);
@@ -243,8 +272,11 @@ class Finder {
     return most;
   }
 
-  bool is_on_ball(double off, double radius) const {
-    return off * radius <= kOnBall * shape_.bounding_radius;
+  // Of a length, which then counts for the whole.
+  bool is_small(double off) {
+    if (!(off <= near_)) return false;
+    off_ = std::max(off_, off);
+    return true;
   }
 
   // Of the part of a ball whose normals differ most.
@@ -254,7 +286,7 @@ class Finder {
       const Curved c = curved(patch);
       if (!(c.angle > widest && c.radius > 0)) continue;
       const Sample middle = sample(patch, 0.5, 0.5);
-      if (!is_on_ball(off_ball(patch, middle.x - c.radius * middle.n, c.radius), c.radius)) continue;
+      if (!is_small(off_ball(patch, middle.x - c.radius * middle.n, c.radius) * c.radius)) continue;
       widest = c.angle;
       out_.radius = c.radius;
     }
@@ -262,7 +294,6 @@ class Finder {
 
   // Takes every patch that lies on a ball of that radius; false if there are too many.
   bool balls() {
-    double most = 0;  // off them
     for (int k = 0; k < static_cast<int>(shape_.patches.size()); ++k) {
       const BezierPatch& patch = shape_.patches[k];
       const Sample middle = sample(patch, 0.5, 0.5);
@@ -270,7 +301,7 @@ class Finder {
       double off = kFarAway;
       const auto holds = [&](const Vec3& point) {
         return (point - centre).norm() <= kNearCentre * out_.radius &&
-               is_on_ball(off = off_ball(patch, point, out_.radius), out_.radius);
+               is_small(off = off_ball(patch, point, out_.radius) * out_.radius);
       };
       if (std::none_of(out_.points.begin(), out_.points.end(), holds)) {
         if (!holds(centre)) continue;
@@ -278,26 +309,28 @@ class Finder {
         out_.points.push_back(centre);
       }
       on_ball_[k] = true;
-      most = std::max(most, off * out_.radius);
+      off_balls_ = std::max(off_balls_, off);
     }
-    out_.error += most;
     return true;
   }
 
   // Whether a patch is plane, or ruled between parts of balls.
-  bool is_between(int k) const {
+  bool is_between(int k) {
     const BezierPatch& patch = shape_.patches[k];
-    if (rounding(patch) == kFarAway) return true;
+    if (rounding(patch) == kFarAway || is_small(out_of_plane(patch, sample(patch, 0.5, 0.5).n))) return true;
     const auto held = [&](int edge) {
       const EdgeLink& link = shape_.links[k][edge];
       return link.collapsed || (link.patch >= 0 && on_ball_[link.patch]);
     };
     const double size = shape_.bounding_radius;
-    return (held(0) && held(1) && is_ruled(patch, false, size)) ||
-           (held(2) && held(3) && is_ruled(patch, true, size));
+    return (held(0) && held(1) && is_small(off_lines(patch, false, size))) ||
+           (held(2) && held(3) && is_small(off_lines(patch, true, size)));
   }
 
   const Shape& shape_;
+  const double near_;
+  double off_ = 0;        // what patches were off what they were taken for, at most ...
+  double off_balls_ = 0;  // ... and parts of the core's balls off those
   std::vector<bool> on_ball_;
   SpheroPolyhedron out_;
 };
@@ -305,20 +338,24 @@ class Finder {
 }  // namespace
 
 SpheroPolyhedron find_sphero_polyhedron(const Shape& shape) {
-  if (shape.joint_slack > 0) return {};
-  Finder finder(shape);
-  const auto plane = [](const BezierPatch& patch) { return rounding(patch) == kFarAway; };
-  if (shape.bilinear && std::all_of(shape.patches.begin(), shape.patches.end(), plane))
-    return finder.polyhedron();
-  return finder.rounded();
+  if (shape.bilinear) return Finder(shape, kExact).polyhedron();
+  for (const double near : {kExact, kNear})
+    if (const SpheroPolyhedron found = Finder(shape, near).rounded(); found.found()) return found;
+  return {};
 }
 
 BallHull find_ball_hull(const Shape& shape) {
-  return shape.joint_slack > 0 || shape.bilinear ? BallHull() : Finder(shape).hull();
+  if (shape.bilinear) return {};
+  for (const double near : {kExact, kNear})
+    if (const BallHull found = Finder(shape, near).hull(); found.found()) return found;
+  return {};
 }
 
 BallHull find_inner_balls(const Shape& shape) {
-  return shape.joint_slack > 0 || shape.bilinear ? BallHull() : Finder(shape).inner();
+  if (shape.bilinear || shape.joint_slack > 0) return {};
+  for (const double near : {kExact, kNear})
+    if (const BallHull found = Finder(shape, near).inner(); found.found()) return found;
+  return {};
 }
 
 }  // namespace nurbs

@@ -42,7 +42,8 @@ void archive(Archive& a, SpheroPolyhedron& s) {
 //     the direction of its normal from the part's centre v, so that h(d) - radius is v . d there, continuous,
 //     and as convex where two parts meet as h is: the largest of all v . d. This rests on normals and
 //     convexity as measured (kinks, Shape::concavity), at slivers to round-off only.
-// Polyhedra: bilinear planar patches, whose corners are of the body and have it in their hull.
+// Of what few digits have moved (by 3e-11 of the body, at most) the balls, smaller by `error`, are proven to
+// lie inside instead. Polyhedra: bilinear patches, whose corners are of the body and have it in their hull.
 SpheroPolyhedron find_sphero_polyhedron(const Shape& shape);
 
 // Hulls of a few balls of different radii, as tapered capsules are; the tip of a cone is a ball of radius 0.
@@ -63,8 +64,8 @@ void archive(Archive& a, BallHull& s) {
 constexpr int kMostBalls = 4;
 
 // Of two to kMostBalls balls. Found by positions as sphero-polyhedra are: every patch is part of a ball,
-// proven, or planar, or straight one way between edges that it shares with those; that the hull of the balls
-// is the body is measured besides, at samples of every patch's points and normals.
+// proven, or planar, or straight one way between edges that it shares with those, up to few digits; that the
+// hull of the balls is the body is measured besides, at samples of every patch's points and normals.
 BallHull find_ball_hull(const Shape& shape);
 
 // Balls inside the body, proven, that parts of its surface lie on (eggs, bullets, balls cut flat), and the

@@ -390,10 +390,11 @@ bool is_certain(const Shape& shape, const Support& s, double enough) {
          s.upper - s.h <= std::max(enough, 2 * kSupportSlack * kRoundoff * shape.bounding_radius);
 }
 
-// By the meridian; false where the body has none, or round-off leaves it open.
-bool find_on_meridian(const Shape& shape, const Vec3& d, const SurfacePoint* start, Support* s) {
+// By the meridian; false where the body has none that is near `enough`, or round-off leaves it open.
+bool find_on_meridian(const Shape& shape, const Vec3& d, const SurfacePoint* start, double enough,
+                      Support* s) {
   MeridianSupport found;
-  if (shape.meridian.empty() ||
+  if (shape.meridian.empty() || !(shape.meridian.exact || 2 * shape.meridian.error <= enough) ||
       !find_meridian_support(shape.meridian, d, shape.bounding_radius, start, &found))
     return false;
   const Jet1 jet = evaluate1(shape.patches[found.where.patch], found.where.u, found.where.v);
@@ -402,14 +403,14 @@ bool find_on_meridian(const Shape& shape, const Vec3& d, const SurfacePoint* sta
   s->slope = 0;
   s->iterations = 1;
   s->converged = true;
-  return is_certain(shape, *s, 0);
+  return is_certain(shape, *s, enough);
 }
 
 }  // namespace
 
 Support find_support(const Shape& shape, const Vec3& d, const SurfacePoint* start) {
   start = if_on_body(shape, start);
-  if (Support s; find_on_meridian(shape, d, start, &s)) return s;
+  if (Support s; find_on_meridian(shape, d, start, 0, &s)) return s;
   const Support local = begin(shape, d, start);
   if (is_certain(shape, local, 0) || (shape.dented() && std::isfinite(local.upper))) return local;
   return search_patches(shape, d, local, cell_of(shape, d));
@@ -418,7 +419,7 @@ Support find_support(const Shape& shape, const Vec3& d, const SurfacePoint* star
 Support find_hull_support(const Shape& shape, const Vec3& d, const SurfacePoint* start, double enough,
                           double flat) {
   start = if_on_body(shape, start);
-  if (Support s; find_on_meridian(shape, d, start, &s)) return s;
+  if (Support s; find_on_meridian(shape, d, start, enough, &s)) return s;
   Support local = begin(shape, d, start, flat);
   if (!is_certain(shape, local, enough) && local.slope > kSlopeTolerance && std::isfinite(local.upper))
     local = climb(shape, d, local.where);
@@ -450,7 +451,7 @@ Support confirm_support(const Shape& shape, const Vec3& d, const SurfacePoint& a
   s.upper = upper_bound(shape, d, s.h, excess_at(shape, d, at, normal));
   s.converged = true;
   if (is_certain(shape, s, enough)) return s;
-  if (Support found; find_on_meridian(shape, d, &at, &found)) return found;
+  if (Support found; find_on_meridian(shape, d, &at, enough, &found)) return found;
   return search_patches(shape, d, s, cell_of(shape, d));
 }
 

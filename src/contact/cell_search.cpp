@@ -86,8 +86,8 @@ class CellSearch {
         a_(side(*pair.a, pair.scale_a, 1, Mat3::Identity(), Vec3::Zero())),
         b_(side(*pair.b, pair.scale_b, -1, pair.turn, pair.offset)),
         balls_(a_.ball + b_.ball),
-        points_a_(*pair.a, kSupportShare * tolerance / pair.scale_a, 0),
-        points_b_(*pair.b, kSupportShare * tolerance / pair.scale_b, 0),
+        points_a_(*pair.a, kSupportShare * tolerance / pair.scale_a, kMostNoise * tolerance / pair.scale_a),
+        points_b_(*pair.b, kSupportShare * tolerance / pair.scale_b, kMostNoise * tolerance / pair.scale_b),
         noise_(8 * kRoundoff * pair.reach + a_.error + b_.error) {}
 
   bool run(PolytopeResult* result) {

@@ -116,15 +116,15 @@ constexpr double kJointCapSafety = 1.5;  // on the angle between the sides of a 
 
 // --- ellipsoids
 constexpr double kEllipsoidGuess = 1e-3;  // relative: how far off the moments' semi-axes may be
-constexpr double kEllipsoid = 1e-12;      // relative: a body this near an ellipsoid is taken as one
+constexpr double kEllipsoid =
+    5e-11;  // relative: a body this near an ellipsoid is one, where the tolerance allows
 
 // --- bodies of revolution
-constexpr double kArcRoundoff = 1e-14;  // of the body's size: distance from the axis that is none
-constexpr double kArcError = 1e-12;     // of it: what arcs about the axis may be off by
+constexpr double kArcError = 1e-10;  // of the body's size: what arcs about the axis may be off by
 
 // --- meridians
-constexpr double kMeridianError = 1e-14;  // of the body's size: patches this near a profile times an arc, ...
-constexpr double kMeridianLack = 3.2e-15;  // ... if in all they are no further from it than this
+constexpr double kMeridianError = 1e-10;   // of the body's size: patches this near a profile times an arc
+constexpr double kMeridianLack = 3.2e-15;  // ... are that to round-off if in all they are no further from it
 constexpr double kMeridianOver = 1e-9;     // rad, parameters: overlap of the patches round the axis
 constexpr int kMeridianStarts = 64;        // directions of its table
 constexpr int kMeridianSteps = 16;         // of Newton; 2 to 4 are usual

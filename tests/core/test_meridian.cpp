@@ -110,12 +110,34 @@ TEST(Meridian, is_of_bodies_of_revolution_only) {
   EXPECT_TRUE(test::ellipsoid_solid(Vec3(1, 0.8, 0.6)).shape->meridian.empty());
   EXPECT_TRUE(test::ellipsoid_solid(Vec3(1, 1, 0.6)).shape->meridian.empty());  // cube patches: no products
   EXPECT_TRUE(test::reuleaux_prism(random, 0.5).shape->meridian.empty());
-  // A little off round.
+}
+
+// What a body is off its meridian counts; off by more it has none.
+TEST(Meridian, is_kept_with_its_error_where_a_body_is_a_little_off_round) {
+  Random random(3);
   const Solid round = test::cylinder(random, 1, 1);
-  std::vector<NurbsSurface> surfaces = round.shape->surfaces;
-  for (NurbsSurface& s : surfaces)
-    for (Vec4& p : s.points) p.x() *= 1 + 1e-12;
-  EXPECT_TRUE(make_shape("oval", surfaces)->meridian.empty());
+  const auto oval = [&](double by) {
+    std::vector<NurbsSurface> surfaces = round.shape->surfaces;
+    for (NurbsSurface& s : surfaces)
+      for (Vec4& p : s.points) p.x() *= 1 + by;
+    return make_shape("oval", surfaces);
+  };
+  EXPECT_TRUE(round.shape->meridian.exact);
+  EXPECT_TRUE(oval(1e-8)->meridian.empty());
+  const std::shared_ptr<const Shape> near = oval(1e-12);
+  ASSERT_FALSE(near->meridian.empty());
+  EXPECT_FALSE(near->meridian.exact);
+  double most = 0;
+  for (int k = 0; k < 2000; ++k) {
+    const Vec3 d = random.direction();
+    MeridianSupport found;
+    ASSERT_TRUE(find_meridian_support(near->meridian, d, near->bounding_radius, nullptr, &found));
+    const double h = search_all_patches(*near, d, near->atlas.place(d)).h;
+    EXPECT_GE(found.upper, h);
+    most = std::max(most, found.upper - h);
+  }
+  EXPECT_LT(most, 2 * near->meridian.error + 1e-14);
+  EXPECT_GT(near->meridian.error, 2e-13);
 }
 
 // From one direction to another over a meridian the support rises at least as a ball of the least radius

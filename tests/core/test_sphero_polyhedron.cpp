@@ -282,6 +282,24 @@ TEST(InnerBalls, are_found_and_lie_inside) {
   EXPECT_FALSE(make_shape("capsule", capsule(0.5, 2))->inner_balls.found());
 }
 
+// Small balls at the corners of a profile, which the surface leaves alone outside of the body as well.
+TEST(InnerBalls, lie_inside_however_small) {
+  Random random(10);
+  int found = 0;
+  for (int k = 0; k < 12; ++k) {
+    const double half = random.uniform(0.3, 1.2), bulge = random.uniform(0.3, 1);
+    const Body body = make_shape(
+        "profile", revolve(rounded_profile({{0, -half}, {bulge, random.uniform(-0.5, 0.5) * half}, {0, half}},
+                                           random.log_uniform(1e-3, 0.2))));
+    const BallHull& balls = body->inner_balls;
+    found += balls.found();
+    for (size_t i = 0; i < balls.centres.size(); ++i)
+      for (const Vec3& d : test::spiral(300))
+        EXPECT_GE(find_hull_support(*body, d).h, d.dot(balls.centres[i]) + balls.radii[i] - balls.error) << k;
+  }
+  EXPECT_GT(found, 6);
+}
+
 // Parts of balls about one centre: p(d) is the same over regions of directions, which no hull of points
 // closes.
 TEST(InnerBalls, contacts_about_one_centre_are_least_overlaps) {

@@ -34,6 +34,7 @@ struct PairCase {
   bool warm = false;  // the pair is remembered from quite another pose
   Particle a_before, b_before;
   Truth truth;
+  double rounded = 0;  // what the bodies may be off the truth's, a length: the digits of a file
   std::function<double(const Vec3&)>
       overlap;  // p(d) in closed form, d in the lab; unset: with the supports of src/
 };

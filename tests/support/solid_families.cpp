@@ -219,6 +219,56 @@ PairCase one_centre(Random& random, long) {
   return c;
 }
 
+// The solids above, control points to 12 to 14 decimals.
+struct RoundedSolid {
+  Solid solid;
+  double off;  // a length
+};
+const std::vector<RoundedSolid>& rounded_solids() {
+  static const std::vector<RoundedSolid> all = [] {
+    std::vector<RoundedSolid> made;
+    for (int k = 0; k < 2 * kKinds + 6; ++k) {
+      const int decimals = 12 + k % 3;
+      Solid solid = k < 2 * kKinds ? solids_of(static_cast<Kind>(k / 2))[k % 2] : balls_in_part()[k % 5];
+      solid.shape = make_shape(solid.shape->name, test::with_decimals(solid.shape->surfaces, decimals));
+      made.push_back({solid, 5 * std::pow(10.0, -decimals) * solid.shape->bounding_radius});
+    }
+    return made;
+  }();
+  return all;
+}
+
+// Anyhow, or deep on one axis, or about one centre.
+PairCase few_digits(Random& random, long) {
+  const auto& bodies = rounded_solids();
+  const auto any = [&]() -> const RoundedSolid& {
+    return bodies[random.below(static_cast<int>(bodies.size()))];
+  };
+  const RoundedSolid &of_a = any(), &of_b = any();
+  const Solid &a = of_a.solid, &b = of_b.solid;
+  const double scale = random.below(3) ? random.uniform(0.3, 3) : 1.0;
+  PairCase c;
+  if (random.below(2)) {
+    c = place(random, a, b, scale, 1e-9, random.below(4) ? 1e-2 : 0.5);
+  } else {
+    const auto axis_of = [](const Shape& s) -> Vec3 {
+      return s.revolution.found ? s.revolution.axis : s.principal_axes * Vec3::UnitZ();
+    };
+    c.a = {a.shape.get(), 1, Vec3::Zero(), random.turn()};
+    c.b = {b.shape.get(), scale, Vec3::Zero(), Quat::Identity()};
+    const Vec3 axis = c.a.q * axis_of(*a.shape);
+    c.b.q = Quat::FromTwoVectors(axis_of(*b.shape), random.sign() * axis).normalized();
+    if (random.below(2)) c.b.q = (random.turn_by(random.log_uniform(1e-12, 0.1)) * c.b.q).normalized();
+    const int steps = random.below(3);
+    c.b.x = steps * random.uniform(-1, 1) * axis;
+    if (random.below(2)) c.b.x += random.log_uniform(1e-12, 0.1) * random.direction();
+    c.overlap = overlap_of(a, b, c);
+    c.truth = search_least(c, a, b, random);
+  }
+  c.rounded = of_a.off + scale * of_b.off;
+  return c;
+}
+
 }  // namespace
 
 const std::vector<Solid>& solids_of(Kind kind) {
@@ -247,6 +297,8 @@ const std::vector<Family>& solid_families() {
       {"hidden dents", "grooves, valleys and twisted walls that samples do not show, under balls to 1 : 1000",
        kPairs, hidden_dent},
       {"one centre", "balls, bullets and eggs whose balls are about one centre", kPairs, one_centre},
+      {"few digits", "all these, control points to 12 to 14 decimals, on one axis and anyhow", kPairs,
+       few_digits},
   };
   return all;
 }

@@ -91,6 +91,17 @@ std::vector<Vec3> poles() {
   return {Vec3::UnitZ(), -Vec3::UnitZ()};
 }
 
+std::vector<NurbsSurface> with_decimals(std::vector<NurbsSurface> surfaces, int decimals) {
+  const double unit = std::pow(10.0, -decimals);
+  for (NurbsSurface& s : surfaces)
+    for (Vec4& p : s.points) {
+      const double w = std::max(1.0, std::round(p[3] / unit)) * unit;
+      for (int k = 0; k < 3; ++k) p[k] = w * std::round(p[k] / p[3] / unit) * unit;
+      p[3] = w;
+    }
+  return surfaces;
+}
+
 Solid turned_solid(Random& random, const std::string& name, std::vector<NurbsSurface> surfaces,
                    std::function<Vec3(const Vec3&)> support, std::vector<Vec3> normals) {
   const Mat3 turn = random.turn().toRotationMatrix();

@@ -36,6 +36,9 @@ std::vector<Vec3> poles();
 Solid turned_solid(Random& random, const std::string& name, std::vector<NurbsSurface> surfaces,
                    std::function<Vec3(const Vec3&)> support, std::vector<Vec3> normals = {});
 
+// Control points and weights to so many decimals, as a file has them.
+std::vector<NurbsSurface> with_decimals(std::vector<NurbsSurface> surfaces, int decimals);
+
 // Each turned by a random rotation baked into the control points, the weights of straight lines scaled by up
 // to `weights` and its inverse.
 Solid cone(Random& random, double radius, double height, double weights = 1);
