@@ -20,6 +20,7 @@ constexpr double kNearCentre = 1e-3;  // of the radius: further ones are another
 constexpr double kExact = 1e-13;      // of the bounding radius: off balls, planes and lines, round-off
 constexpr double kNear = 3e-11;       // ... and few digits
 constexpr double kSamePoint = 1e-12;  // of the bounding radius: of corners
+constexpr double kOnePoint = 1e-9;     // ... and of centres: nearer ones are one that is not known well
 constexpr double kTwoNormals = 1e-3;  // rad: closer ones give no radius
 constexpr int kHullSamples = 9;       // per patch and parameter
 constexpr double kInside = 1e-12;     // of a ball's radius, that it may lie outside
@@ -230,7 +231,7 @@ class Finder {
       const Sample middle = sample(patch, 0.5, 0.5);
       const Vec3 centre = middle.x - seen[k].radius * middle.n;
       if (!holds(centre, seen[k].radius)) continue;
-      if (static_cast<int>(out->centres.size()) == kMostBalls) return false;
+      if (static_cast<int>(out->centres.size()) == kMostBalls || is_known(out->centres, centre)) return false;
       out->centres.push_back(centre);
       out->radii.push_back(seen[k].radius);
       on_ball_[k] = true;
@@ -272,6 +273,12 @@ class Finder {
     return most;
   }
 
+  bool is_known(const std::vector<Vec3>& points, const Vec3& x) const {
+    return std::any_of(points.begin(), points.end(), [&](const Vec3& y) {
+      return (x - y).norm() <= kOnePoint * shape_.bounding_radius;
+    });
+  }
+
   // Of a length, which then counts for the whole.
   bool is_small(double off) {
     if (!(off <= near_)) return false;
@@ -305,7 +312,7 @@ class Finder {
       };
       if (std::none_of(out_.points.begin(), out_.points.end(), holds)) {
         if (!holds(centre)) continue;
-        if (out_.points.size() == kMostPoints) return false;
+        if (out_.points.size() == kMostPoints || is_known(out_.points, centre)) return false;
         out_.points.push_back(centre);
       }
       on_ball_[k] = true;

@@ -62,6 +62,7 @@ struct Bend {
 };
 
 constexpr int kPaceFrom = 384, kPaceStep = 128;  // points at which the bracket's width is looked at
+constexpr double kThinnest = 1e-12;              // of the larger body: heights of points' hulls
 constexpr int kPointAttempts = 2;                // flat differences of points may have no hull
 constexpr double kNearStart = 0.9995;            // cosine between directions nearer than the atlas's
 constexpr int kBeforeRings = 64;                 // queries before rings of directions are looked for
@@ -389,6 +390,8 @@ class Search {
     const double volume = pick_largest(3, [&](const Vec3& e) { return std::abs(e.dot(square)); });
     *across = square.normalized();
     if (!(volume > least * size * size * size)) return false;
+    // Of points that are one to round-off the inside is none.
+    if (points_ && !(volume > kThinnest * pair_.reach * square.norm())) return false;
     if (!hull_.start(pick[0], pick[1], pick[2], pick[3])) return false;
     for (int k = 0; k < hull_.points(); ++k)
       if (k != pick[0] && k != pick[1] && k != pick[2] && k != pick[3]) hull_.grow(k, least_height());

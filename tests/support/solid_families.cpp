@@ -231,7 +231,8 @@ const std::vector<RoundedSolid>& rounded_solids() {
       const int decimals = 12 + k % 3;
       Solid solid = k < 2 * kKinds ? solids_of(static_cast<Kind>(k / 2))[k % 2] : balls_in_part()[k % 5];
       solid.shape = make_shape(solid.shape->name, test::with_decimals(solid.shape->surfaces, decimals));
-      made.push_back({solid, 5 * std::pow(10.0, -decimals) * solid.shape->bounding_radius});
+      // Masses and so centres are integrated to 1e-12.
+      made.push_back({solid, 5 * (1e-12 + std::pow(10.0, -decimals)) * solid.shape->bounding_radius});
     }
     return made;
   }();
