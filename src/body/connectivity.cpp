@@ -234,13 +234,14 @@ double signed_angle(const Vec3& normal_a, const Vec3& normal_b, const Vec3& alon
   return along.cross(normal_a).dot(normal_b) >= 0 ? angle : -angle;
 }
 
-// Adds the groove between two sides that meet at a concave angle, see measure_kinks.
-void add_groove(double angle, const LocalForm& a, const LocalForm& b, int p, int e, const Vec3& outward,
-                KinkSummary& worst) {
-  const double width = (e < 2 ? a.su : a.sv).norm();
+// Adds the groove between two sides, along edges ea and eb, that meet at a concave angle; see measure_kinks.
+void add_groove(double angle, const LocalForm& a, const LocalForm& b, int p, int ea, int eb,
+                const Vec3& outward, KinkSummary& worst) {
+  const auto width_of = [](const LocalForm& f, int e) { return (e < 2 ? f.su : f.sv).norm(); };
+  const double wa = width_of(a, ea), wb = width_of(b, eb);
   const double ka = normal_curvature(a, outward), kb = normal_curvature(b, outward),
                flatter = std::min(ka, kb);
-  double depth = 0.25 * angle * width, excess = angle * width;  // of straight sides
+  double depth = angle * wa * wb / (wa + wb), excess = angle * std::max(wa, wb);  // of straight sides
   if (flatter > 0) {
     const double roots = std::sqrt(ka) + std::sqrt(kb);
     depth = std::min(depth, angle * angle / (2 * roots * roots));
@@ -300,7 +301,7 @@ double edge_kink(const std::vector<BezierPatch>& patches, int p, int e, const Ed
     if (!s.counts || s.sine() < std::min(kJointSine, kJointSineShare * most)) continue;
     const Vec3 along = (forward ? 1.0 : -1.0) * edge_tangent(patches[p], e, s.at, s.a);
     const double angle = signed_angle(s.a.normal, s.b.normal, along);
-    if (angle < 0) add_groove(-angle, s.a, s.b, p, e, along.cross(s.a.normal), worst);
+    if (angle < 0) add_groove(-angle, s.a, s.b, p, e, link.edge, along.cross(s.a.normal), worst);
     worst.convex = std::max(worst.convex, angle);
     if (std::abs(angle) > std::abs(kink)) kink = angle;
   }

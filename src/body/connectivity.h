@@ -92,7 +92,7 @@ struct KinkSummary {
 // Angles are the largest of kKinkSamples, `convex` and `concave` never below what joints.h proves once that
 // is a kink. A groove's depth is that below the common tangent of the two sides, taken as arcs of their
 // curvatures k across the edge: kink^2 / (2 (sqrt(k_a) + sqrt(k_b))^2), never more than that of two straight
-// sides a patch wide.
+// sides as wide as the patches.
 KinkSummary measure_kinks(const std::vector<BezierPatch>& patches, PatchLinks& links);
 
 // For each surface, whether it must be turned (u and v exchanged) to agree with the first surface of its

@@ -208,7 +208,8 @@ class Search {
       Vec3 across;
       // Points alone may be flat, and no hull of theirs any bound: balls are left on them then.
       const bool any = round + 1 == kFlatRounds && !points_;
-      if (start_from_points(any ? 0 : kFlatStart, &across)) return true;
+      const double least = any ? 0 : round < kNeedleRound ? kFlatStart : kNeedleStart;
+      if (start_from_points(least, &across)) return true;
       query(across, -1);
       query(-across, -1);
     }

@@ -252,6 +252,8 @@ constexpr double kCoreShare = 0.5;      // of the smaller of the bodies' least c
                                         // other wholly: more would leave two spheres no volume
 constexpr double kCoreError = 0.1;      // of the tolerance, that sphero-polyhedra may be off by
 constexpr double kFlatStart = 1e-3;     // volume of a first tetrahedron over its longest edge cubed, at least
+constexpr double kNeedleStart = 1e-7;   // ... and of needles, where looking for better ones did not help ...
+constexpr int kNeedleRound = 2;         // ... so often
 constexpr int kFlatRounds = 4;          // of looking for a better one
 constexpr double kLeastHeight = 0.02;   // of the tolerance: a point less high above a face is not added
 constexpr double kHullSlope = 1e-7;     // rad: points of the polytope's hull are this near to their supports'
