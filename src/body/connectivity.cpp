@@ -241,7 +241,8 @@ void add_groove(double angle, const LocalForm& a, const LocalForm& b, int p, int
   const double wa = width_of(a, ea), wb = width_of(b, eb);
   const double ka = normal_curvature(a, outward), kb = normal_curvature(b, outward),
                flatter = std::min(ka, kb);
-  double depth = angle * wa * wb / (wa + wb), excess = angle * std::max(wa, wb);  // of straight sides
+  double depth = wa > 0 && wb > 0 ? angle * wa * wb / (wa + wb) : 0,
+         excess = angle * std::max(wa, wb);  // of straight sides
   if (flatter > 0) {
     const double roots = std::sqrt(ka) + std::sqrt(kb);
     depth = std::min(depth, angle * angle / (2 * roots * roots));

@@ -8,6 +8,8 @@
 namespace nurbs {
 namespace {
 
+constexpr double kFootNoise = 64;  // round-offs of the furthest corner, between a plane and its foot
+
 int count_positive(const Vec3& w) {
   return (w[0] > 0) + (w[1] > 0) + (w[2] > 0);
 }
@@ -48,15 +50,17 @@ Vec3 nearest_on_triangle(const Vec3& a, const Vec3& b, const Vec3& c) {
   w[i] = 1;
   if (dq <= 0 && dr <= 0) return w;
   const Vec3 n = Edges(a, b, c).normal();
-  const auto on_edge = [&](int to, double t) {
+  // No further than to the corner: of an edge that is round-off next to its distance the share is any.
+  const auto on_edge = [&](int to, double along, const Vec3& edge) {
+    const double length2 = edge.squaredNorm(), t = along < length2 ? along / length2 : 1;
     w[to] = t;
     w[i] = 1 - t;
     return w;
   };
   // q and r are further away than p: no other corner can be the nearest, nor an edge's far half from p.
   const double wr = n.dot(p.cross(pq)), wq = n.dot(pr.cross(p));
-  if (wr <= 0 && dq >= 0) return on_edge(j, dq / pq.squaredNorm());
-  if (wq <= 0 && dr >= 0) return on_edge(k, dr / pr.squaredNorm());
+  if (wr <= 0 && dq >= 0) return on_edge(j, dq, pq);
+  if (wq <= 0 && dr >= 0) return on_edge(k, dr, pr);
   const Vec3 qr = r - q;
   const double wp = n.dot((far[j] <= far[k] ? q : r).cross(qr));
   if (wp <= 0) {
@@ -114,7 +118,36 @@ void GrowingHull::find_foot(int f) {
   Face& face = face_[f];
   foot_[f] = true;
   face.weights = nearest_on_triangle(point_[face.vertex[0]], point_[face.vertex[1]], point_[face.vertex[2]]);
-  if (count_positive(face.weights) < 3 || face.sliver) distance2_[f] = nearest_point(face).squaredNorm();
+  if (count_positive(face.weights) < 3 || face.sliver) {
+    distance2_[f] = nearest_point(face).squaredNorm();
+    return;
+  }
+  if (!holds_foot(face)) make_sliver(f);
+}
+
+// Whether a triangle has its plane's foot where its weights say, those settled once if need be: of a needle
+// with corners far away the plane may be mostly round-off.
+bool GrowingHull::holds_foot(Face& face) const {
+  const Vec3 &p = point_[face.vertex[0]], &q = point_[face.vertex[1]], &r = point_[face.vertex[2]];
+  const double far = std::sqrt(std::max({p.squaredNorm(), q.squaredNorm(), r.squaredNorm()})),
+               most = std::abs(face.offset) + kFootNoise * kRoundoff * far;
+  if (nearest_point(face).squaredNorm() <= most * most) return true;
+  const Vec3 pq = q - p, pr = r - p, x = nearest_point(face);
+  const double qq = pq.squaredNorm(), rr = pr.squaredNorm(), qr = pq.dot(pr), det = qq * rr - qr * qr,
+               xq = x.dot(pq), xr = x.dot(pr), dq = (qr * xr - rr * xq) / det, dr = (qr * xq - qq * xr) / det;
+  const Vec3 settled = face.weights + Vec3(-dq - dr, dq, dr);
+  if (!(settled.minCoeff() > 0)) return false;
+  face.weights = settled / settled.sum();
+  return nearest_point(face).squaredNorm() <= most * most;
+}
+
+void GrowingHull::make_sliver(int f) {
+  Face& face = face_[f];
+  behind_ -= face.offset < 0;
+  face.sliver = true;
+  face.normal.setZero();
+  face.offset = 0;
+  distance2_[f] = nearest_point(face).squaredNorm();
 }
 
 bool GrowingHull::start(int a, int b, int c, int d) {

@@ -78,6 +78,8 @@ class GrowingHull {
   void set(int f, int a, int b, int c);
   void drop(int f);
   void find_foot(int f);
+  bool holds_foot(Face& face) const;
+  void make_sliver(int f);
   double least_distance2() const;
   int highest_seen_from(const Vec3& p, double* height) const;
   bool find_visible(const Vec3& p, int first, double threshold);
