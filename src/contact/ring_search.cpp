@@ -24,6 +24,7 @@ constexpr int kDeepestSector = 60;         // halvings of the azimuth
 constexpr double kNearAxis = 0.2;          // sine between the axes up to which both bodies' circles are used
 constexpr double kNearlyAlike = 0.1;    // of the body's radius: what directions of a ring may differ by ...
 constexpr double kHardlyAlike = 0.4;    // ... where nothing else did
+constexpr double kMostNoise = 0.5;      // of the tolerance, that bodies may be off those of revolution
 constexpr double kClosedShare = 0.9;    // of the tolerance at which a sector is closed ...
 constexpr double kMeridianShare = 0.4;  // ... and below which its width, not its circles, keeps it open
 constexpr double kLeastTilt = 3e-3;     // sine between the axes from which the mate's tip may do better
@@ -140,7 +141,7 @@ class RingSearch {
     view_.ball_k = std::min(view_.ball_k, std::max(0.0, depth - view_.ball));
     best_ = -result->bracket.lower - balls();
     best_e_ = e;
-    if (!(best_ > tolerance_) || !query(e)) return false;
+    if (!(best_ > tolerance_ && noise_ <= kMostNoise * tolerance_) || !query(e)) return false;
     choose_mate(e);
     on_k_ = last_k_;
     on_m_ = last_m_;

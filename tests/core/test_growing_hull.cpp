@@ -134,6 +134,20 @@ TEST(GrowingHull, needles_know_their_plane_and_their_nearest_point) {
   }
 }
 
+// Two corners a round-off apart, far from the origin: what is nearest on the edge between them is any of it,
+// and no place beyond.
+TEST(GrowingHull, nearest_point_of_a_far_needle_is_on_it) {
+  Random random(13);
+  for (int k = 0; k < 2000; ++k) {
+    const double far = random.log_uniform(1e3, 1e8);
+    const Vec3 p = far * random.direction(), q = p + random.log_uniform(1e-17, 1e-14) * far * random.direction(),
+               r = p * random.uniform(1, 3) + far * random.direction();
+    const Vec3 w = nearest_on_triangle(p, q, r);
+    EXPECT_GE(w.minCoeff(), 0) << k;
+    EXPECT_NEAR(w.sum(), 1, 1e-15) << k;
+  }
+}
+
 TEST(GrowingHull, four_points_of_a_plane_are_no_start) {
   GrowingHull hull(kSliverHeight);
   for (const Vec3& p : {Vec3(0, 0, 0), Vec3(1, 0, 0), Vec3(0, 1, 0), Vec3(1, 1, 0), Vec3(0, 0, 1)})

@@ -13,6 +13,7 @@
 #include "contact/pair_search.h"
 #include "io/pair_case.h"
 #include "io/shape_file.h"
+#include "shapes/revolved.h"
 #include "support/least_overlap.h"
 #include "support/pairs.h"
 #include "support/solid_families.h"
@@ -463,6 +464,43 @@ TEST(SavedCases, contact_points_lie_on_the_bodies) {
     EXPECT_LT(outside(pair.b, r.point_b - (pair.b.x - pair.a.x)), 1e-7) << file;
     EXPECT_LT((r.point_b - r.point_a).cross(r.normal).norm(), 1e-6) << file;
   }
+}
+
+// Next to a body 230,000 times as large the points were 636 sizes off, and the upper end of the bracket below
+// the lower one: the share of a far edge that is round-off long came out as 1e12.
+TEST(SavedCases, contact_points_beside_a_body_much_larger) {
+  const PairCase pair = read_pair_case("tests/cases/egg-on-large-drum.json");
+  double memory[kPairMemorySize] = {0};
+  const ContactResult r = find_contact(pair.a, pair.b, pair.settings, memory);
+  const double size = pair.a.scale * pair.a.shape->bounding_radius;
+  EXPECT_EQ(r.status, Status::converged);
+  EXPECT_LT(outside(pair.a, r.point_a), 1e-7 * size);
+  EXPECT_LT((r.point_b - r.point_a).cross(r.normal).norm(), 0.01 * size);
+}
+
+// Left open by up to a tenth of their size, though apart: differences of needles 1 : 1000 were too thin to
+// begin a hull with. The distance of the points, both of the bodies, and the supports along the normal meet.
+TEST(SavedCases, needles_apart_and_touching) {
+  for (const char* file : {"needle-pyramids.json", "spheroid-on-needle.json"}) {
+    const PairCase pair = read_pair_case(std::string("tests/cases/") + file);
+    double memory[kPairMemorySize] = {0};
+    const ContactResult r = find_contact(pair.a, pair.b, pair.settings, memory);
+    EXPECT_EQ(r.status, Status::converged) << file;
+    EXPECT_NEAR(test::overlap_along(pair.a, pair.b, r.normal), -r.gap, 1e-9) << file;
+    EXPECT_NEAR((r.point_b - r.point_a).norm(), r.gap, 1e-9) << file;
+    EXPECT_LT(outside(pair.a, r.point_a), 1e-9) << file;
+    EXPECT_LT(outside(pair.b, r.point_b - (pair.b.x - pair.a.x)), 1e-9) << file;
+  }
+}
+
+// Refused as dented by a sixth of their size: a fillet a few thousand digits wide ends at an angle to the face
+// that is large and makes a groove no deeper than the digits.
+TEST(Solids, small_fillets_of_few_digits_are_accepted) {
+  for (const int decimals : {6, 7, 8})
+    for (const double fillet : {1e-2, 1e-3, 1e-4}) {
+      const auto body = make_shape("tablet", test::with_decimals(tablet(1, 0.8, fillet), decimals));
+      EXPECT_LT(body->concavity, 20 * std::pow(10.0, -decimals)) << fillet;
+    }
 }
 
 // The normal was off by 2e-6 rad: beside a pole a step is none of Newton's.
