@@ -244,7 +244,10 @@ class Search {
       asked_along = direction_to_ask_;
       const int v = query(direction_to_ask_, closest_of(hull_.face(near), direction_to_ask_));
       if (v < 0 || upper_ - lower_ <= tolerance_) return;
-      if (hull_.grow(v, least_height(), near) != GrowingHull::Growth::grown) {
+      GrowingHull::Growth growth = hull_.grow(v, least_height(), near);
+      // Beyond a needle's edge a point is hardly above either face.
+      if (growth == GrowingHull::Growth::inside) growth = hull_.grow(v, 0.25 * roundoff(), near);
+      if (growth != GrowingHull::Growth::grown) {
         stalled_ = true;
         return;
       }
@@ -880,6 +883,21 @@ bool has_rings(const Shape& shape) {
   return shape.revolution.found || !shape.round_edges.empty();
 }
 
+// What two attempts know together: the narrower one's points, along the direction of the higher lower end.
+PolytopeResult both(const PolytopeResult& x, const PolytopeResult& y, double tolerance) {
+  PolytopeResult r = y.bracket.width() < x.bracket.width() ? y : x;
+  const Bracket& higher = y.bracket.lower > x.bracket.lower ? y.bracket : x.bracket;
+  r.bracket.lower = higher.lower;
+  r.bracket.upper = std::max(std::min(x.bracket.upper, y.bracket.upper), higher.lower);
+  r.bracket.direction = r.points.na = higher.direction;
+  r.points.nb = -higher.direction;
+  r.converged = r.bracket.width() <= tolerance;
+  const double apart = higher.direction.dot(r.points.b - r.points.a);
+  r.gap = r.converged ? std::clamp(apart, r.bracket.lower, r.bracket.upper) : r.bracket.lower;
+  part_points(&r);
+  return r;
+}
+
 // What is left where a hull does not close.
 bool search_last(const PairFrame& pair, double tolerance, PolytopeResult* best) {
   if (!search_rings(pair, tolerance, true, best) && !search_cells(pair, tolerance, best)) return false;
@@ -935,7 +953,12 @@ PolytopeResult solve_polytope(const PairFrame& pair, const Vec3& seed, double to
     }
     const PolytopeResult result = search.result();
     const int spent = attempt > 0 ? best.iterations : 0;
-    if (attempt == 0 || result.bracket.width() < best.bracket.width()) best = result;
+    if (attempt == 0)
+      best = result;
+    else if (!result.converged && !best.converged)
+      best = both(best, result, tolerance);
+    else if (result.converged)
+      best = result;
     best.iterations = spent + result.iterations;
     if (best.converged || best.bracket.lower > enough || (started && !search.stalled())) break;
     from = best.bracket.direction + kHullTurn * (attempt + 1) * Vec3(0.36, -0.48, 0.8);

@@ -219,6 +219,48 @@ PairCase one_centre(Random& random, long) {
   return c;
 }
 
+// Images of the solids, 300 to 1000 times as long as thick.
+const std::vector<Solid>& needles() {
+  static const std::vector<Solid> all = [] {
+    Random random(1012);
+    std::vector<Solid> made;
+    for (int k = 0; k < 3 * kKinds; ++k)
+      made.push_back(test::stretched(random, solids_of(static_cast<Kind>(k % kKinds))[k / kKinds],
+                                     random.log_uniform(1e-3, 3e-3)));
+    return made;
+  }();
+  return all;
+}
+
+// Each against itself, not turned at all, hardly, by half a turn or anyhow, or against another.
+PairCase needle_pair(Random& random, long) {
+  const auto& bodies = needles();
+  const auto any = [&]() -> const Solid& { return bodies[random.below(static_cast<int>(bodies.size()))]; };
+  const Solid& a = any();
+  const bool twins = random.below(3) > 0;
+  const Solid& b = twins ? a : any();
+  PairCase c = place(random, a, b, random.below(2) ? 1 : random.uniform(0.3, 1.5), 1e-9, 1);
+  if (!twins) return c;
+  const Vec3 n = (c.a.q * some_direction(a, random)).normalized();
+  c.b.q = c.a.q;
+  const int turn = random.below(4);
+  if (turn == 1) c.b.q = (random.turn_by(random.log_uniform(1e-12, 1e-2)) * c.b.q).normalized();
+  if (turn == 2) c.b.q = (Quat(Eigen::AngleAxisd(M_PI, random.direction())) * c.b.q).normalized();
+  if (turn == 3) c.b.q = random.turn();
+  const double gap = random.sign() * c.b.scale * random.log_uniform(1e-9, 1);
+  c.b.x = support_of(a, c.a, n) - support_of(b, c.b, -n) + gap * n;
+  c.overlap = overlap_of(a, b, c);
+  c.truth = {};
+  if (gap > 0) {
+    c.truth.gap = gap;
+    c.truth.has_normal = true;
+    c.truth.normal = n;
+  } else {
+    c.truth = search_least(c, a, b, random);
+  }
+  return c;
+}
+
 // The solids above, control points to 12 to 14 decimals.
 struct RoundedSolid {
   Solid solid;
@@ -298,6 +340,8 @@ const std::vector<Family>& solid_families() {
       {"hidden dents", "grooves, valleys and twisted walls that samples do not show, under balls to 1 : 1000",
        kPairs, hidden_dent},
       {"one centre", "balls, bullets and eggs whose balls are about one centre", kPairs, one_centre},
+      {"needles", "images of cones, cylinders, capsules, lenses and polyhedra, 1 : 300 to 1 : 1000, twins",
+       kPairs, needle_pair},
       {"few digits", "all these, control points to 12 to 14 decimals, on one axis and anyhow", kPairs,
        few_digits},
   };
