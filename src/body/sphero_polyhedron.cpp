@@ -20,7 +20,7 @@ constexpr double kNearCentre = 1e-3;  // of the radius: further ones are another
 constexpr double kExact = 1e-13;      // of the bounding radius: off balls, planes and lines, round-off
 constexpr double kNear = 3e-11;       // ... and few digits
 constexpr double kSamePoint = 1e-12;  // of the bounding radius: of corners
-constexpr double kOnePoint = 1e-9;     // ... and of centres: nearer ones are one that is not known well
+constexpr double kOnePoint = 1e-9;    // ... and of centres: nearer ones are one that is not known well
 constexpr double kTwoNormals = 1e-3;  // rad: closer ones give no radius
 constexpr int kHullSamples = 9;       // per patch and parameter
 constexpr double kInside = 1e-12;     // of a ball's radius, that it may lie outside
@@ -274,9 +274,8 @@ class Finder {
   }
 
   bool is_known(const std::vector<Vec3>& points, const Vec3& x) const {
-    return std::any_of(points.begin(), points.end(), [&](const Vec3& y) {
-      return (x - y).norm() <= kOnePoint * shape_.bounding_radius;
-    });
+    return std::any_of(points.begin(), points.end(),
+                       [&](const Vec3& y) { return (x - y).norm() <= kOnePoint * shape_.bounding_radius; });
   }
 
   // Of a length, which then counts for the whole.

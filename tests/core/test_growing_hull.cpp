@@ -140,7 +140,8 @@ TEST(GrowingHull, nearest_point_of_a_far_needle_is_on_it) {
   Random random(13);
   for (int k = 0; k < 2000; ++k) {
     const double far = random.log_uniform(1e3, 1e8);
-    const Vec3 p = far * random.direction(), q = p + random.log_uniform(1e-17, 1e-14) * far * random.direction(),
+    const Vec3 p = far * random.direction(),
+               q = p + random.log_uniform(1e-17, 1e-14) * far * random.direction(),
                r = p * random.uniform(1, 3) + far * random.direction();
     const Vec3 w = nearest_on_triangle(p, q, r);
     EXPECT_GE(w.minCoeff(), 0) << k;

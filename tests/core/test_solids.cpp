@@ -493,8 +493,8 @@ TEST(SavedCases, needles_apart_and_touching) {
   }
 }
 
-// Refused as dented by a sixth of their size: a fillet a few thousand digits wide ends at an angle to the face
-// that is large and makes a groove no deeper than the digits.
+// Refused as dented by a sixth of their size: a fillet a few thousand digits wide ends at an angle to the
+// face that is large and makes a groove no deeper than the digits.
 TEST(Solids, small_fillets_of_few_digits_are_accepted) {
   for (const int decimals : {6, 7, 8})
     for (const double fillet : {1e-2, 1e-3, 1e-4}) {

@@ -818,7 +818,8 @@ Verdict judge(const PairCase& c, const Answer& r, double mesh_error) {
   if (!(v.error <= v.allowed)) return fail(Failure::error);
   if (mesh_error > 0) return v;
   if (r.has_bracket) {
-    // A search may have missed the last digits of the least overlap, and the normal need not be the bracket's.
+    // A search may have missed the last digits of the least overlap, and the normal need not be the
+    // bracket's.
     const double above = c.truth.known == Known::bound ? v.allowed : roundoff;
     if (!(r.lower <= truth + above && r.upper >= truth - roundoff && r.upper - r.lower <= v.allowed))
       return fail(Failure::bracket);
