@@ -953,12 +953,7 @@ PolytopeResult solve_polytope(const PairFrame& pair, const Vec3& seed, double to
     }
     const PolytopeResult result = search.result();
     const int spent = attempt > 0 ? best.iterations : 0;
-    if (attempt == 0)
-      best = result;
-    else if (!result.converged && !best.converged)
-      best = both(best, result, tolerance);
-    else if (result.converged)
-      best = result;
+    best = attempt == 0 || result.converged ? result : both(best, result, tolerance);
     best.iterations = spent + result.iterations;
     if (best.converged || best.bracket.lower > enough || (started && !search.stalled())) break;
     from = best.bracket.direction + kHullTurn * (attempt + 1) * Vec3(0.36, -0.48, 0.8);

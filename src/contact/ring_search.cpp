@@ -266,7 +266,7 @@ class RingSearch {
   // Of the mate in its own axes: its core's support along unit `own`.
   Vec3 mate_core(const Support& on, const Vec3& own) const {
     const double left = view_.swept ? view_.scale_m * view_.swept->radius - view_.ball : -1;
-    if (left < 0) return view_.scale_m * on.point - view_.ball * on.normal;
+    if (!view_.swept || left < 0) return view_.scale_m * on.point - view_.ball * on.normal;
     return view_.scale_m * view_.swept->points[view_.swept->support(own)] + left * own;
   }
 
