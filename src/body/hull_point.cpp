@@ -17,7 +17,7 @@ HullPoints::HullPoints(const Shape& shape, double enough, double allowed) : shap
   } else if (shape.core.found() && shape.core.error <= allowed) {
     form_ = Form::points;
     error_ = shape.core.error;
-  } else if (!shape.meridian.empty() && (shape.meridian.exact || shape.meridian.error <= allowed)) {
+  } else if (shape.meridian.serves(allowed)) {
     form_ = Form::meridian;
     error_ = shape.meridian.error;
   } else {

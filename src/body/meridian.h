@@ -43,6 +43,8 @@ struct Meridian {
   bool exact = false;            // that is round-off
 
   bool empty() const { return pieces.empty(); }
+  // Whether there is one that the body is off by no more than `allowed`, or round-off.
+  bool serves(double allowed) const { return !empty() && (exact || error <= allowed); }
 };
 template <class Archive>
 void archive(Archive& a, Meridian::Piece& s) {

@@ -341,27 +341,26 @@ class Finder {
   SpheroPolyhedron out_;
 };
 
+// Exactly, or else up to few digits.
+template <class Form>
+Form find(const Shape& shape, Form (Finder::*form)()) {
+  for (const double near : {kExact, kNear})
+    if (Form found = (Finder(shape, near).*form)(); found.found()) return found;
+  return {};
+}
+
 }  // namespace
 
 SpheroPolyhedron find_sphero_polyhedron(const Shape& shape) {
-  if (shape.bilinear) return Finder(shape, kExact).polyhedron();
-  for (const double near : {kExact, kNear})
-    if (const SpheroPolyhedron found = Finder(shape, near).rounded(); found.found()) return found;
-  return {};
+  return shape.bilinear ? Finder(shape, kExact).polyhedron() : find(shape, &Finder::rounded);
 }
 
 BallHull find_ball_hull(const Shape& shape) {
-  if (shape.bilinear) return {};
-  for (const double near : {kExact, kNear})
-    if (const BallHull found = Finder(shape, near).hull(); found.found()) return found;
-  return {};
+  return shape.bilinear ? BallHull() : find(shape, &Finder::hull);
 }
 
 BallHull find_inner_balls(const Shape& shape) {
-  if (shape.bilinear || shape.joint_slack > 0) return {};
-  for (const double near : {kExact, kNear})
-    if (const BallHull found = Finder(shape, near).inner(); found.found()) return found;
-  return {};
+  return shape.bilinear || shape.joint_slack > 0 ? BallHull() : find(shape, &Finder::inner);
 }
 
 }  // namespace nurbs

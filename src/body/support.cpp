@@ -394,7 +394,7 @@ bool is_certain(const Shape& shape, const Support& s, double enough) {
 bool find_on_meridian(const Shape& shape, const Vec3& d, const SurfacePoint* start, double enough,
                       Support* s) {
   MeridianSupport found;
-  if (shape.meridian.empty() || !(shape.meridian.exact || 2 * shape.meridian.error <= enough) ||
+  if (!shape.meridian.serves(0.5 * enough) ||
       !find_meridian_support(shape.meridian, d, shape.bounding_radius, start, &found))
     return false;
   const Jet1 jet = evaluate1(shape.patches[found.where.patch], found.where.u, found.where.v);

@@ -118,11 +118,11 @@ void GrowingHull::find_foot(int f) {
   Face& face = face_[f];
   foot_[f] = true;
   face.weights = nearest_on_triangle(point_[face.vertex[0]], point_[face.vertex[1]], point_[face.vertex[2]]);
-  if (count_positive(face.weights) < 3 || face.sliver) {
-    distance2_[f] = nearest_point(face).squaredNorm();
-    return;
+  if (count_positive(face.weights) == 3 && !face.sliver) {
+    if (holds_foot(face)) return;
+    make_sliver(face);
   }
-  if (!holds_foot(face)) make_sliver(f);
+  distance2_[f] = nearest_point(face).squaredNorm();
 }
 
 // Whether a triangle has its plane's foot where its weights say, those settled once if need be: of a needle
@@ -131,8 +131,8 @@ bool GrowingHull::holds_foot(Face& face) const {
   const Vec3 &p = point_[face.vertex[0]], &q = point_[face.vertex[1]], &r = point_[face.vertex[2]];
   const double far = std::sqrt(std::max({p.squaredNorm(), q.squaredNorm(), r.squaredNorm()})),
                most = std::abs(face.offset) + kFootNoise * kRoundoff * far;
-  if (nearest_point(face).squaredNorm() <= most * most) return true;
-  const Vec3 pq = q - p, pr = r - p, x = nearest_point(face);
+  const Vec3 x = nearest_point(face), pq = q - p, pr = r - p;
+  if (x.squaredNorm() <= most * most) return true;
   const double qq = pq.squaredNorm(), rr = pr.squaredNorm(), qr = pq.dot(pr), det = qq * rr - qr * qr,
                xq = x.dot(pq), xr = x.dot(pr), dq = (qr * xr - rr * xq) / det, dr = (qr * xq - qq * xr) / det;
   const Vec3 settled = face.weights + Vec3(-dq - dr, dq, dr);
@@ -141,13 +141,11 @@ bool GrowingHull::holds_foot(Face& face) const {
   return nearest_point(face).squaredNorm() <= most * most;
 }
 
-void GrowingHull::make_sliver(int f) {
-  Face& face = face_[f];
+void GrowingHull::make_sliver(Face& face) {
   behind_ -= face.offset < 0;
   face.sliver = true;
   face.normal.setZero();
   face.offset = 0;
-  distance2_[f] = nearest_point(face).squaredNorm();
 }
 
 bool GrowingHull::start(int a, int b, int c, int d) {

@@ -79,7 +79,7 @@ class GrowingHull {
   void drop(int f);
   void find_foot(int f);
   bool holds_foot(Face& face) const;
-  void make_sliver(int f);
+  void make_sliver(Face& face);
   double least_distance2() const;
   int highest_seen_from(const Vec3& p, double* height) const;
   bool find_visible(const Vec3& p, int first, double threshold);

@@ -109,6 +109,14 @@ class Pace {
   double before_ = kFarAway;
 };
 
+// That of the points along the normal. Where the bracket stayed open, the least overlap seen: the hull errs
+// to first order, the direction to second.
+void set_gap(PolytopeResult* r) {
+  const double apart = r->points.na.dot(r->points.b - r->points.a);
+  r->gap = r->converged ? std::clamp(apart, r->bracket.lower, r->bracket.upper) : r->bracket.lower;
+  part_points(r);
+}
+
 // Everything the search over directions keeps.
 class Search {
  public:
@@ -316,11 +324,7 @@ class Search {
     r.points.b = b + (direction_.dot(w.b - b) - shrink_b_) * direction_;
     r.points.on_a = surface_place(*pair_.a, w.on_a, direction_);
     r.points.on_b = surface_place(*pair_.b, w.on_b, pair_.direction_on_b(direction_));
-    const double apart = direction_.dot(r.points.b - r.points.a);
-    // Where the bracket stayed open, the least overlap seen: the hull errs to first order, the direction to
-    // second.
-    r.gap = r.converged ? std::clamp(apart, r.bracket.lower, r.bracket.upper) : r.bracket.lower;
-    part_points(&r);
+    set_gap(&r);
     return r;
   }
 
@@ -892,9 +896,7 @@ PolytopeResult both(const PolytopeResult& x, const PolytopeResult& y, double tol
   r.bracket.direction = r.points.na = higher.direction;
   r.points.nb = -higher.direction;
   r.converged = r.bracket.width() <= tolerance;
-  const double apart = higher.direction.dot(r.points.b - r.points.a);
-  r.gap = r.converged ? std::clamp(apart, r.bracket.lower, r.bracket.upper) : r.bracket.lower;
-  part_points(&r);
+  set_gap(&r);
   return r;
 }
 

@@ -84,6 +84,21 @@ std::function<double(const Vec3&)> overlap_of(const Solid& a, const Solid& b, co
   };
 }
 
+// B's supports along unit n from A, lab, `gap` apart along it: the truth, apart.
+void face(const Solid& a, const Solid& b, const Vec3& n, double gap, PairCase* c) {
+  c->b.x = support_of(a, c->a, n) - support_of(b, c->b, -n) + gap * n;
+  c->overlap = overlap_of(a, b, *c);
+  c->truth.gap = gap;
+  c->truth.has_normal = true;
+  c->truth.normal = n;
+}
+
+// The same; overlapping ones are searched.
+void face_or_search(Random& random, const Solid& a, const Solid& b, const Vec3& n, double gap, PairCase* c) {
+  face(a, b, n, gap, c);
+  if (!(gap > 0)) c->truth = search_least(*c, a, b, random);
+}
+
 // Supports along a direction, `gap` apart along it; overlapping ones are searched.
 PairCase place(Random& random, const Solid& a, const Solid& b, double scale, double least, double most) {
   PairCase c;
@@ -96,15 +111,7 @@ PairCase place(Random& random, const Solid& a, const Solid& b, double scale, dou
   }
   const double size = std::min(a.shape->bounding_radius, scale * b.shape->bounding_radius);
   const double gap = random.sign() * size * random.log_uniform(least, most);
-  c.b.x = support_of(a, c.a, n) - support_of(b, c.b, -n) + gap * n;
-  c.overlap = overlap_of(a, b, c);
-  if (gap > 0) {
-    c.truth.gap = gap;
-    c.truth.has_normal = true;
-    c.truth.normal = n;
-  } else {
-    c.truth = search_least(c, a, b, random);
-  }
+  face_or_search(random, a, b, n, gap, &c);
   return c;
 }
 
@@ -174,11 +181,7 @@ PairCase hidden_dent(Random& random, long) {
   const double gap = c.b.scale * random.log_uniform(1e-9, 1e-2) * (&b == &oval ? 1 : random.sign());
   // Of a ball whose centre is outside the hull the gap's sign makes no difference: the nearest point is
   // known.
-  c.b.x = support_of(a, c.a, n) - support_of(b, c.b, -n) + gap * n;
-  c.overlap = overlap_of(a, b, c);
-  c.truth.gap = gap;
-  c.truth.has_normal = true;
-  c.truth.normal = n;
+  face(a, b, n, gap, &c);
   return c;
 }
 
@@ -239,25 +242,18 @@ PairCase needle_pair(Random& random, long) {
   const Solid& a = any();
   const bool twins = random.below(3) > 0;
   const Solid& b = twins ? a : any();
-  PairCase c = place(random, a, b, random.below(2) ? 1 : random.uniform(0.3, 1.5), 1e-9, 1);
-  if (!twins) return c;
+  const double scale = random.below(2) ? 1 : random.uniform(0.3, 1.5);
+  if (!twins) return place(random, a, b, scale, 1e-9, 1);
+  PairCase c;
+  c.a = {a.shape.get(), 1, Vec3::Zero(), random.turn()};
+  c.b = {b.shape.get(), scale, Vec3::Zero(), c.a.q};
   const Vec3 n = (c.a.q * some_direction(a, random)).normalized();
-  c.b.q = c.a.q;
   const int turn = random.below(4);
   if (turn == 1) c.b.q = (random.turn_by(random.log_uniform(1e-12, 1e-2)) * c.b.q).normalized();
   if (turn == 2) c.b.q = (Quat(Eigen::AngleAxisd(M_PI, random.direction())) * c.b.q).normalized();
   if (turn == 3) c.b.q = random.turn();
-  const double gap = random.sign() * c.b.scale * random.log_uniform(1e-9, 1);
-  c.b.x = support_of(a, c.a, n) - support_of(b, c.b, -n) + gap * n;
-  c.overlap = overlap_of(a, b, c);
-  c.truth = {};
-  if (gap > 0) {
-    c.truth.gap = gap;
-    c.truth.has_normal = true;
-    c.truth.normal = n;
-  } else {
-    c.truth = search_least(c, a, b, random);
-  }
+  const double gap = random.sign() * scale * random.log_uniform(1e-9, 1);
+  face_or_search(random, a, b, n, gap, &c);
   return c;
 }
 
