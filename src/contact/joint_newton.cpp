@@ -116,7 +116,7 @@ struct Normal {
 NURBS_INLINE Normal outward(const JetLanes& j, const SurfacePoint& at, double size) {
   const Vec3 su = j.at(Slot::kSu), sv = j.at(Slot::kSv);
   const double lu = su.squaredNorm(), lv = sv.squaredNorm();
-  constexpr double kLost = kPoleNormal * kPoleNormal, kFading = 1e4;
+  constexpr double kLost = kPoleNormal * kPoleNormal, kFading = 1e4, kNear = kNearPole * kNearPole;
   Normal n{su.cross(sv), lu < kLost * lv || lv < kLost * lu};
   const double shorter = std::min(lu, lv);
   // Towards a pole a tangent fades; across a narrow strip it is short all along, and its limit says nothing.
@@ -125,11 +125,13 @@ NURBS_INLINE Normal outward(const JetLanes& j, const SurfacePoint& at, double si
     const Vec3 suv = j.at(Slot::kSuv);
     n.direction = lu < lv ? suv.cross(sv) : su.cross(suv);
     if ((lu < lv ? at.v : at.u) >= 0.5) n.direction = -n.direction;
-  } else if (const double area2 = n.direction.squaredNorm();
-             shorter < kNearPole * kNearPole * std::max(lu, lv) || area2 <= lost_area2(lu + lv, size)) {
-    n.noise =
-        area2 > 0 ? std::min(kNoNormal, kTangentNoise * size * std::sqrt((lu + lv) / area2)) : kNoNormal;
   }
+  const double area2 = n.direction.squaredNorm(), faded2 = fades ? j.at(Slot::kSuv).squaredNorm() : shorter,
+               longer = std::max(lu, lv), speed2 = faded2 + longer;
+  // The limit may be in line with the other tangent, as where a flat face narrows to a tip.
+  if ((fades ? area2 < kNear * faded2 * longer : shorter < kNear * longer) ||
+      area2 <= lost_area2(speed2, size))
+    n.noise = area2 > 0 ? std::min(kNoNormal, kTangentNoise * size * std::sqrt(speed2 / area2)) : kNoNormal;
   n.direction.normalize();
   return n;
 }

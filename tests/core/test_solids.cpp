@@ -493,6 +493,31 @@ TEST(SavedCases, needles_apart_and_touching) {
   }
 }
 
+// Half balls tip on tip, overlapping, were certified apart by as much: the flat face's patch narrows to the tip
+// with both of its limiting tangents in line, and what round-off left of their product was taken as a normal.
+TEST(SavedCases, flat_faces_that_narrow_to_a_tip) {
+  PairCase pair = read_pair_case("tests/cases/flat-face-tips.json");
+  const auto solve = [&] {
+    double memory[kPairMemorySize] = {0};
+    return find_contact(pair.a, pair.b, pair.settings, memory);
+  };
+  EXPECT_NEAR(solve().gap, -0.01, 1e-9);
+  const double size = pair.a.scale * pair.a.shape->bounding_radius;
+  Random random(11);
+  const Quat turn_b = pair.b.q;
+  const Vec3 at_b = pair.b.x;
+  const std::vector<Vec3> many = test::spiral(3000);
+  for (int k = 0; k < 40; ++k) {
+    pair.b.q = turn_b * Quat(Eigen::AngleAxisd(k % 2 ? M_PI / 4 * k : random.uniform(0, 6.3), Vec3::UnitZ()));
+    pair.b.x = at_b * random.uniform(0.9, 1.01);
+    const ContactResult r = solve();
+    const double overlap = test::least_overlap(
+        [&](const Vec3& d) { return test::overlap_along(pair.a, pair.b, d); }, many, test::Compass(), random);
+    EXPECT_EQ(r.status, Status::converged) << k;
+    EXPECT_NEAR(r.gap, -overlap, 1e-6 * size) << k;
+  }
+}
+
 // Refused as dented by a sixth of their size: a fillet a few thousand digits wide ends at an angle to the
 // face that is large and makes a groove no deeper than the digits.
 TEST(Solids, small_fillets_of_few_digits_are_accepted) {
