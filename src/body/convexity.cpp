@@ -19,6 +19,8 @@ namespace {
 constexpr size_t kClimbs = 4;         // places that are refined
 constexpr size_t kInwardPlaces = 8;   // of cells that bend inward, of either kind
 constexpr double kLeastDepth = 0.25;  // of the excess: a shallow dent's is about that at least
+constexpr int kMostTangents = 40;     // in the search for the hull's plane, per direction ...
+constexpr double kTiltTolerance = 1e-10;  // ... or until its rise is known to this, of that at the ends
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 // Every k-th sample so that at most `most` remain.
@@ -87,35 +89,41 @@ size_t index_of_largest(const std::vector<double>& v) {
   return static_cast<size_t>(std::max_element(v.begin(), v.end()) - v.begin());
 }
 
-struct Minimum {
-  double at = 0, value = 0;
-};
-
-// Minimum of a convex function on [-range, range] by golden sections.
-template <class Function>
-Minimum minimise(const Function& f, double range) {
-  constexpr double kGolden = 0.6180339887498949;
-  double lo = -range, hi = range;
-  double a = hi - kGolden * (hi - lo), b = lo + kGolden * (hi - lo), fa = f(a), fb = f(b);
-  for (int i = 0; i < kTiltSections; ++i) {
-    if (fa < fb) {
-      hi = b, b = a, fb = fa;
-      a = hi - kGolden * (hi - lo), fa = f(a);
-    } else {
-      lo = a, a = b, fa = fb;
-      b = lo + kGolden * (hi - lo), fb = f(b);
-    }
-  }
-  return fa < fb ? Minimum{a, fa} : Minimum{b, fb};
-}
-
 // Planes through surface points, in the axes (t1, t2, n) of a dent: the rise of the k-th above the dent's
 // point along the direction (a, b, 1) is (a, b, 1) . plane.
 using Planes = std::vector<Vec3>;
 
-double highest(const Planes& planes, double a, double b) {
-  double most = -kInfinity;
-  for (const Vec3& p : planes) most = std::max(most, a * p[0] + b * p[1] + p[2]);
+// A convex function of one variable where it was asked for: a slope there, and one along what is held fixed.
+struct Tangent {
+  double at, value, slope, across;
+};
+
+// Minimum of a convex, piecewise linear function on [-range, range]: where the tangents on either side of it
+// meet, which become two of its pieces (Kelley 1960, in one dimension).
+template <class Function>
+Tangent minimise(const Function& f, double range) {
+  Tangent lo = f(-range), hi = f(range);
+  if (!(lo.slope < 0)) return lo;
+  if (!(hi.slope > 0)) return hi;
+  const double enough = kTiltTolerance * (std::abs(lo.value) + std::abs(hi.value));
+  for (int i = 0;; ++i) {
+    const double apart = hi.slope - lo.slope;
+    const double meet = (lo.value - lo.slope * lo.at - (hi.value - hi.slope * hi.at)) / apart;
+    Tangent t = f(std::clamp(meet, lo.at, hi.at));
+    if (!(t.value > lo.value + lo.slope * (t.at - lo.at) + enough) || i == kMostTangents) {
+      t.slope = 0;
+      t.across = (hi.slope * lo.across - lo.slope * hi.across) / apart;
+      return t;
+    }
+    (t.slope < 0 ? lo : hi) = t;
+  }
+}
+
+// The highest of the planes at a tilt, as a function of b.
+Tangent highest(const Planes& planes, double a, double b) {
+  Tangent most{b, -kInfinity, 0, 0};
+  for (const Vec3& p : planes)
+    if (const double rise = a * p[0] + b * p[1] + p[2]; rise > most.value) most = {b, rise, p[1], p[0]};
   return most;
 }
 
@@ -124,8 +132,13 @@ Vec3 least_rise(const Planes& planes, double tilt) {
   const auto inner = [&](double a) {
     return minimise([&](double b) { return highest(planes, a, b); }, tilt);
   };
-  const Minimum best = minimise([&](double a) { return inner(a).value; }, tilt);
-  return {best.at, inner(best.at).at, best.value};
+  const auto outer = [&](double a) {
+    const Tangent t = inner(a);
+    return Tangent{a, t.value, t.across, 0};
+  };
+  const double a = minimise(outer, tilt).at;
+  const Tangent best = inner(a);
+  return {a, best.at, best.value};
 }
 
 // What the round-off of the normal at a point raises the body by, seen along it: of needles, much.
