@@ -16,10 +16,10 @@
 namespace nurbs {
 namespace {
 
-constexpr size_t kClimbs = 4;         // places that are refined
-constexpr size_t kInwardPlaces = 8;   // of cells that bend inward, of either kind
-constexpr double kLeastDepth = 0.25;  // of the excess: a shallow dent's is about that at least
-constexpr int kMostTangents = 40;     // in the search for the hull's plane, per direction ...
+constexpr size_t kClimbs = 4;             // places that are refined
+constexpr size_t kInwardPlaces = 8;       // of cells that bend inward, of either kind
+constexpr double kLeastDepth = 0.25;      // of the excess: a shallow dent's is about that at least
+constexpr int kMostTangents = 40;         // in the search for the hull's plane, per direction ...
 constexpr double kTiltTolerance = 1e-10;  // ... or until its rise is known to this, of that at the ends
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 

@@ -15,29 +15,21 @@ namespace {
 using Row = Meridian::Row;
 
 constexpr double kTurn = 6.283185307179586;  // rad
+constexpr double kRippledOver = 1e-4;        // rad: overlap of patches that are rippled, all round
 
 // --- made once
 
-// Longer than double: what is left of the differences is the surface's own round-off, not theirs.
-using Real = long double;
-using Real4 = Eigen::Matrix<Real, 4, 1>;
+using Real = ArcNet::Real;
 using Real3 = Eigen::Matrix<Real, 3, 1>;
 
-// Homogeneous coordinates of a patch's net about the axis, arcs first.
-struct Net {
-  int arc = 0, profile = 0;   // degrees
-  std::vector<Real4> points;  // x, y, z, w
-  const Real4& at(int i, int j) const { return points[static_cast<size_t>(i) * (profile + 1) + j]; }
-};
-
-Net net_about(const BezierPatch& patch, bool arcs_in_u, const Meridian& m) {
-  Net net;
+ArcNet net_about(const BezierPatch& patch, bool arcs_in_u, const Meridian& m) {
+  ArcNet net;
   net.arc = arcs_in_u ? patch.degree_u : patch.degree_v;
   net.profile = arcs_in_u ? patch.degree_v : patch.degree_u;
   const Eigen::Matrix<Real, 3, 3> axes = m.axes.cast<Real>();
   for (int i = 0; i <= net.arc; ++i)
     for (int j = 0; j <= net.profile; ++j) {
-      const Real4 p = (arcs_in_u ? patch.point(i, j) : patch.point(j, i)).cast<Real>();
+      const ArcNet::Point p = (arcs_in_u ? patch.point(i, j) : patch.point(j, i)).cast<Real>();
       const Real3 from = axes * (p.head<3>() - p[3] * m.point.cast<Real>());
       net.points.emplace_back(from[0], from[1], from[2], p[3]);
     }
@@ -66,8 +58,9 @@ double beyond_circle(const Meridian::Sector& s, const Row& weight) {
   return static_cast<double>(0.5L * most);
 }
 
-// Profile and arc whose product the net is, and how far outside of that it reaches, a length.
-double factorise(const Net& net, Meridian::Piece* piece, Meridian::Sector* sector) {
+// Profile and arc whose product the net is, and how far outside of that it reaches, a length. `rippled`:
+// whether how is asked for; where it is not known, the net is none.
+double factorise(const ArcNet& net, bool rippled, Meridian::Piece* piece, Meridian::Sector* sector) {
   int widest = 0;
   Real r = 0;
   for (int j = 0; j <= net.profile; ++j) {
@@ -78,7 +71,7 @@ double factorise(const Net& net, Meridian::Piece* piece, Meridian::Sector* secto
   Row weight{};  // of the arc
   sector->degree = net.arc;
   for (int i = 0; i <= net.arc; ++i) {
-    const Real4& p = net.at(i, widest);
+    const ArcNet::Point& p = net.at(i, widest);
     sector->x[i] = static_cast<double>(p[0] / r);
     sector->y[i] = static_cast<double>(p[1] / r);
     weight[i] = static_cast<double>(p[3] / net.at(0, widest)[3]);
@@ -86,7 +79,7 @@ double factorise(const Net& net, Meridian::Piece* piece, Meridian::Sector* secto
   piece->degree = net.profile;
   double speed = 0, least = kFarAway, most = 0, furthest = 0;
   for (int j = 0; j <= net.profile; ++j) {
-    const Real4& p = net.at(0, j);
+    const ArcNet::Point& p = net.at(0, j);
     piece->r[j] = static_cast<double>(p[0] * sector->x[0] + p[1] * sector->y[0]);
     piece->z[j] = static_cast<double>(p[2]);
     piece->w[j] = static_cast<double>(p[3]);
@@ -100,12 +93,15 @@ double factorise(const Net& net, Meridian::Piece* piece, Meridian::Sector* secto
   // Floater, Derivatives of rational Bezier curves, 1992.
   piece->speed = net.profile * speed * (most / least) * (most / least);
   Real error = 0;
+  ArcNet product{net.arc, net.profile, {}};
   for (int i = 0; i <= net.arc; ++i)
     for (int j = 0; j <= net.profile; ++j) {
-      const Real4& p = net.at(i, j);
+      const ArcNet::Point& p = net.at(i, j);
       const Real pr = piece->r[j];
-      const Real4 made(pr * sector->x[i], pr * sector->y[i], static_cast<Real>(piece->z[j]) * weight[i],
-                       static_cast<Real>(piece->w[j]) * weight[i]);
+      const ArcNet::Point made(pr * sector->x[i], pr * sector->y[i],
+                               static_cast<Real>(piece->z[j]) * weight[i],
+                               static_cast<Real>(piece->w[j]) * weight[i]);
+      product.points.push_back(made);
       const Real off = (p - made).head<3>().norm() + std::abs(p[3] - made[3]) * p.head<3>().norm() / p[3];
       error = std::max(error, off / p[3]);
     }
@@ -113,7 +109,14 @@ double factorise(const Net& net, Meridian::Piece* piece, Meridian::Sector* secto
   sector->sweep = 0;  // by the way the control points go round, less than half a turn each
   for (int i = 0; i < net.arc; ++i)
     sector->sweep += turn(sector->x[i], sector->y[i], sector->x[i + 1], sector->y[i + 1]);
-  return static_cast<double>(error) + furthest * std::max(0.0, beyond_circle(*sector, weight));
+  const double outside =
+      static_cast<double>(error) + furthest * std::max(0.0, beyond_circle(*sector, weight));
+  if (rippled) {
+    const auto row = [&](const Row& r) { return std::vector<Real>(r.begin(), r.begin() + net.arc + 1); };
+    piece->ripple = ripple_of(net, product, {row(sector->x), row(sector->y), row(weight)}, piece->speed);
+    if (piece->ripple.empty()) return kFarAway;
+  }
+  return outside;
 }
 
 // How far apart two pieces are, run through the same or opposite ways, their weights' difference counted with
@@ -126,6 +129,41 @@ double difference(const Meridian::Piece& a, const Meridian::Piece& b, bool backw
     const double weight = a.w[i] / a.w[0] - b.w[k] / b.w[backwards ? b.degree : 0];
     most = std::max(most, std::hypot(a.r[i] / a.w[i] - b.r[k] / b.w[k], a.z[i] / a.w[i] - b.z[k] / b.w[k]) +
                               std::abs(weight) * size);
+  }
+  return most;
+}
+
+// Control points of the line at an end of a patch's arcs, along the piece.
+std::vector<Vec4> line_at_end(const Meridian::Sector& s, const BezierPatch& patch, bool last) {
+  const int n = s.arcs_in_u ? patch.degree_v : patch.degree_u, i = last ? s.degree : 0;
+  std::vector<Vec4> line;
+  for (int j = 0; j <= n; ++j) {
+    const int k = s.backwards ? n - j : j;
+    line.push_back(s.arcs_in_u ? patch.point(i, k) : patch.point(k, i));
+  }
+  return line;
+}
+
+// How far apart, at most, the lines are with which sectors that follow each other meet: where each end's is
+// nearest to one of another sector.
+double seam_of(const std::vector<Meridian::Sector>& sectors, const std::vector<BezierPatch>& patches,
+               double size) {
+  std::vector<std::vector<Vec4>> lines;
+  for (const Meridian::Sector& s : sectors)
+    for (const bool last : {false, true}) lines.push_back(line_at_end(s, patches[s.patch], last));
+  const auto apart = [&](const std::vector<Vec4>& a, const std::vector<Vec4>& b) {
+    double most = 0;
+    for (size_t j = 0; j < a.size(); ++j)
+      most = std::max(most, (a[j].head<3>() / a[j][3] - b[j].head<3>() / b[j][3]).norm() +
+                                size * std::abs(a[j][3] / a[0][3] - b[j][3] / b[0][3]));
+    return most;
+  };
+  double most = 0;
+  for (size_t k = 0; k < lines.size(); ++k) {
+    double least = kFarAway;
+    for (size_t l = 0; l < lines.size(); ++l)
+      if (l != k && (lines.size() == 2 || l / 2 != k / 2)) least = std::min(least, apart(lines[k], lines[l]));
+    most = std::max(most, least);
   }
   return most;
 }
@@ -329,6 +367,35 @@ int piece_swept(const Meridian& m, const Meridian::Sector& sector) {
   return piece;
 }
 
+// At a place where the profile has its support along (dr, dz), but for `upper`.
+ProfilePoint profile_point(const Meridian& m, const Meridian::Place& place, double dr, double dz,
+                           double size) {
+  ProfilePoint found;
+  found.place = place;
+  const Meridian::Piece& piece = m.pieces[place.piece];
+  const Jet r = quotient(piece, piece.r, place.t), z = quotient(piece, piece.z, place.t);
+  const double speed = std::hypot(r.f1, z.f1), side = dr * z.f1 - dz * r.f1 < 0 ? -1 : 1;
+  found.r = r.f;
+  found.z = z.f;
+  const bool normal = speed > kHeldSpeed * size;
+  found.turn_r = normal ? side * z.f1 / speed : dr;
+  found.turn_z = normal ? -side * r.f1 / speed : dz;
+  return found;
+}
+
+Ripple ripple_at(const Meridian::Piece& piece, double t) {
+  Ripple r;
+  for (int j = 0; j <= piece.degree; ++j)
+    r.add(binomial(piece.degree, j) * std::pow(t, j) * std::pow(1 - t, piece.degree - j), piece.ripple[j]);
+  return r;
+}
+
+// Of a point on a patch that a piece sweeps.
+Meridian::Place place_on(const Meridian& m, const Meridian::Sector& sector, const SurfacePoint& at) {
+  const double t = sector.arcs_in_u ? at.v : at.u;
+  return {piece_swept(m, sector), sector.backwards ? 1 - t : t};
+}
+
 // The arc's parameter where it points along (x, y), of angle `angle`; false where Newton is not sure.
 bool parameter_of(const Meridian::Sector& s, double x, double y, double angle, double* u) {
   double share = wrap(angle - (s.begin + 0.5 * s.sweep)) / s.sweep + 0.5;
@@ -354,7 +421,8 @@ bool parameter_of(const Meridian::Sector& s, double x, double y, double angle, d
 
 }  // namespace
 
-Meridian make_meridian(const std::vector<BezierPatch>& patches, const Revolution& revolution, double size) {
+Meridian make_meridian(const std::vector<BezierPatch>& patches, const Revolution& revolution, double size,
+                       double allowed) {
   if (!revolution.found) return {};
   Meridian m;
   const Vec3 across = revolution.axis.unitOrthogonal();
@@ -363,7 +431,8 @@ Meridian make_meridian(const std::vector<BezierPatch>& patches, const Revolution
   m.axes.row(2) = revolution.axis;
   m.point = revolution.point;
   m.sector_of.assign(patches.size(), -1);
-  const double close = kMeridianError * size;
+  const double close = allowed * size;
+  const bool rippled = allowed > kMeridianError;
   struct Found {
     Meridian::Piece piece;
     std::vector<Meridian::Sector> sectors;
@@ -376,7 +445,7 @@ Meridian make_meridian(const std::vector<BezierPatch>& patches, const Revolution
     for (const bool arcs_in_u : {true, false}) {
       Meridian::Piece profile;
       Meridian::Sector arc;
-      const double e = factorise(net_about(patches[p], arcs_in_u, m), &profile, &arc);
+      const double e = factorise(net_about(patches[p], arcs_in_u, m), rippled, &profile, &arc);
       if (!(e < error) || arc.sweep == 0) continue;
       error = e;
       piece = profile;
@@ -396,18 +465,23 @@ Meridian make_meridian(const std::vector<BezierPatch>& patches, const Revolution
         mine = &f;
         sector.backwards = backwards;
         error += apart;
+        for (Ripple& r : piece.ripple) r.most += apart;
       }
     m.error = std::max(m.error, error);
     if (!mine) {
       all.push_back({piece, {}});
       mine = &all.back();
     }
+    if (sector.backwards) std::reverse(piece.ripple.begin(), piece.ripple.end());
+    for (size_t k = 0; k < piece.ripple.size(); ++k) mine->piece.ripple[k].include(piece.ripple[k]);
+    for (const Ripple& r : piece.ripple) m.ripple.include(r);
     mine->sectors.push_back(sector);
   }
   for (Found& f : all) {
     double turn = 0;
     for (const Meridian::Sector& s : f.sectors) turn += std::abs(s.sweep);
-    if (!(std::abs(turn - kTurn) <= kMeridianOver)) return {};
+    if (!(std::abs(turn - kTurn) <= (rippled ? kRippledOver : kMeridianOver))) return {};
+    if (rippled) m.seam = std::max(m.seam, f.sectors.size() * seam_of(f.sectors, patches, size));
     f.piece.first_sector = static_cast<int>(m.sectors.size());
     f.piece.sectors = static_cast<int>(f.sectors.size());
     for (const Meridian::Sector& s : f.sectors) {
@@ -416,7 +490,7 @@ Meridian make_meridian(const std::vector<BezierPatch>& patches, const Revolution
     }
     m.pieces.push_back(f.piece);
   }
-  if (m.pieces.empty() || !(m.error <= kMeridianError * size)) return {};
+  if (m.pieces.empty() || !(m.error <= close)) return {};
   m.exact = m.error <= kMeridianLack * size;
   for (int k = 0; k <= kMeridianStarts; ++k) {
     const double at = 2.0 * k / kMeridianStarts - 1, dr = 1 - std::abs(at), length = std::hypot(dr, at);
@@ -450,15 +524,7 @@ bool find_profile_point(const Meridian& m, double dr, double dz, double size, co
                         ProfilePoint* found) {
   ProfileSearch search(m, dr, dz, size);
   if (!search.run_from_table(start)) return false;
-  found->place = search.best();
-  const Meridian::Piece& piece = m.pieces[found->place.piece];
-  const Jet r = quotient(piece, piece.r, found->place.t), z = quotient(piece, piece.z, found->place.t);
-  const double speed = std::hypot(r.f1, z.f1), side = dr * z.f1 - dz * r.f1 < 0 ? -1 : 1;
-  found->r = r.f;
-  found->z = z.f;
-  const bool normal = speed > kHeldSpeed * size;
-  found->turn_r = normal ? side * z.f1 / speed : dr;
-  found->turn_z = normal ? -side * r.f1 / speed : dz;
+  *found = profile_point(m, search.best(), dr, dz, size);
   found->upper = search.height() + search.slack();
   return true;
 }
@@ -470,10 +536,7 @@ bool find_meridian_support(const Meridian& m, const Vec3& d, double size, const 
   const bool started = start && m.sector_of[start->patch] >= 0;
   const Meridian::Sector* last = started ? &m.sectors[m.sector_of[start->patch]] : nullptr;
   Meridian::Place from;
-  if (last) {
-    const double t = last->arcs_in_u ? start->v : start->u;
-    from = {piece_swept(m, *last), last->backwards ? 1 - t : t};
-  }
+  if (last) from = place_on(m, *last, *start);
   ProfileSearch search(m, dr, e[2], size);
   if (!search.run_from_table(from)) return false;
   const Meridian::Place best = search.best();
@@ -495,6 +558,48 @@ bool find_meridian_support(const Meridian& m, const Vec3& d, double size, const 
   for (int k = 0; k < piece.sectors; ++k) {
     const Meridian::Sector& sector = m.sectors[piece.first_sector + k];
     if (&sector != last && parameter_of(sector, x, y, angle, &u)) return put(sector, u);
+  }
+  return false;
+}
+
+bool find_round_point(const Meridian& m, const std::vector<BezierPatch>& patches, const Vec3& d, double size,
+                      const SurfacePoint& support, RoundPoint* found) {
+  const Vec3 e = m.axes * d;
+  const double dr = std::hypot(e[0], e[1]);
+  if (!(dr > kRoundoff)) return false;
+  Meridian::Place best;
+  if (support.patch >= 0 && m.sector_of[support.patch] >= 0) {
+    best = place_on(m, m.sectors[m.sector_of[support.patch]], support);
+  } else {
+    ProfileSearch search(m, dr, e[2], size);
+    if (!search.run_from_table({})) return false;
+    best = search.best();
+  }
+  const Meridian::Piece& piece = m.pieces[best.piece];
+  const double x = e[0] / dr, y = e[1] / dr, angle = std::atan2(y, x);
+  for (int k = 0; k < piece.sectors; ++k) {
+    const Meridian::Sector& sector = m.sectors[piece.first_sector + k];
+    double u;
+    if (!parameter_of(sector, x, y, angle, &u)) continue;
+    const double t = sector.backwards ? 1 - best.t : best.t;
+    found->where = {sector.patch, sector.arcs_in_u ? u : t, sector.arcs_in_u ? t : u};
+    const Jet1 jet = evaluate1(patches[sector.patch], found->where.u, found->where.v);
+    const Jet ax = evaluate(sector.x, sector.degree, u), ay = evaluate(sector.y, sector.degree, u);
+    const double turn = (ax.f * ay.f1 - ay.f * ax.f1) / (ax.f * ax.f + ay.f * ay.f);  // of the arc, by u
+    const Vec3 at = m.axes * (jet.s - m.point), by_u = m.axes * (sector.arcs_in_u ? jet.su : jet.sv);
+    found->r = x * at[0] + y * at[1];
+    found->z = at[2];
+    found->slope_r = x * at[1] - y * at[0] + (x * by_u[0] + y * by_u[1]) / turn;
+    found->slope_z = by_u[2] / turn;
+    found->profile = profile_point(m, best, dr / std::hypot(dr, e[2]), e[2] / std::hypot(dr, e[2]), size);
+    const double from_begin = wrap(angle - sector.begin) * (sector.sweep < 0 ? -1 : 1),
+                 passed = std::clamp(from_begin < -kMeridianOver ? from_begin + kTurn : from_begin, 0.0,
+                                     std::abs(sector.sweep)),
+                 left = std::abs(sector.sweep) - passed;
+    found->ripple = ripple_at(piece, best.t);
+    found->before = sector.sweep < 0 ? left : passed;
+    found->after = sector.sweep < 0 ? passed : left;
+    return true;
   }
   return false;
 }

@@ -6,7 +6,9 @@
 
 #include "body/direction_atlas.h"
 #include "body/revolution.h"
+#include "body/ripple.h"
 #include "nurbs/bezier_patch.h"
+#include "nurbs/tolerances.h"
 #include "nurbs/types.h"
 
 namespace nurbs {
@@ -17,8 +19,9 @@ struct Meridian {
   using Row = std::array<double, kMaxDegree + 1>;
   struct Piece {  // of the profile, in Bernstein form
     int degree = 0;
-    Row r{}, z{}, w{};  // homogeneous: distance from the axis, height over the axis point, weight
-    double speed = 0;   // |d(r, z)/dt| is at most this
+    Row r{}, z{}, w{};           // homogeneous: distance from the axis, height over the axis point, weight
+    double speed = 0;            // |d(r, z)/dt| is at most this
+    std::vector<Ripple> ripple;  // shares of its control points, of all patches; none: of round-off only
     int first_sector = 0, sectors = 0;  // the patches that it sweeps
   };
   struct Sector {  // of one patch round the axis
@@ -41,6 +44,8 @@ struct Meridian {
   Vec3 point = Vec3::Zero();     // on it
   double error = 0;              // by how much the body's support may exceed that of the above
   bool exact = false;            // that is round-off
+  Ripple ripple;                 // of all, at most
+  double seam = 0;               // what their lines round the axis are off where they meet, all round
 
   bool empty() const { return pieces.empty(); }
   // Whether there is one that the body is off by no more than `allowed`, or round-off.
@@ -48,8 +53,8 @@ struct Meridian {
 };
 template <class Archive>
 void archive(Archive& a, Meridian::Piece& s) {
-  auto& [degree, r, z, w, speed, first_sector, sectors] = s;
-  a(degree, r, z, w, speed, first_sector, sectors);
+  auto& [degree, r, z, w, speed, ripple, first_sector, sectors] = s;
+  a(degree, r, z, w, speed, ripple, first_sector, sectors);
 }
 template <class Archive>
 void archive(Archive& a, Meridian::Sector& s) {
@@ -63,14 +68,16 @@ void archive(Archive& a, Meridian::Place& s) {
 }
 template <class Archive>
 void archive(Archive& a, Meridian& s) {
-  auto& [pieces, sectors, starts, sector_of, axes, point, error, exact] = s;
-  a(pieces, sectors, starts, sector_of, axes, point, error, exact);
+  auto& [pieces, sectors, starts, sector_of, axes, point, error, exact, ripple, seam] = s;
+  a(pieces, sectors, starts, sector_of, axes, point, error, exact, ripple, seam);
 }
 
 // Of a body of revolution whose joints meet to round-off. `size`: bounding radius. Patches in a plane square
-// to the axis need not be such products: the rest bounds them. Few digits may keep a body off it by
-// kMeridianError: it then serves where that is little of what is asked for.
-Meridian make_meridian(const std::vector<BezierPatch>& patches, const Revolution& revolution, double size);
+// to the axis need not be such products: the rest bounds them. Few digits may keep a body off it by `allowed`
+// of the size: it then serves where that is little of what is asked for, or as the product that the ripple is
+// off of.
+Meridian make_meridian(const std::vector<BezierPatch>& patches, const Revolution& revolution, double size,
+                       double allowed = kMeridianError);
 
 // A point of the profile, in the half plane of its axis, lengths of the shape.
 struct ProfilePoint {
@@ -103,5 +110,22 @@ struct MeridianSupport {
 // nullptr. 0.1 to 0.2 us.
 bool find_meridian_support(const Meridian& meridian, const Vec3& d, double size, const SurfacePoint* start,
                            MeridianSupport* found);
+
+// A point of the body itself on a parameter line round the axis, at the azimuth of a direction: that of its
+// support along it or, where that is on no such line or not given, of the profile's. As functions of the
+// azimuth phi (of the patch's arc) its distance r from the axis and height z are, from `before` to `after`
+// (r, z)(phi) = (r, z) + phi (slope_r, slope_z) but for the ripple's bend phi^2 / 2, and at any other azimuth
+// the body holds a point that is within twice the ripple's most of (r, z).
+struct RoundPoint {
+  SurfacePoint where;
+  ProfilePoint profile;           // of the product, `upper` left out
+  double r, z, slope_r, slope_z;  // height over the axis point; slopes per rad
+  double before, after;           // rad, not negative
+  Ripple ripple;                  // of that line
+};
+// Along unit d; false along the axis, or where round-off leaves it open. `support`: patch -1 for none. 0.3
+// us, no allocation.
+bool find_round_point(const Meridian& meridian, const std::vector<BezierPatch>& patches, const Vec3& d,
+                      double size, const SurfacePoint& support, RoundPoint* found);
 
 }  // namespace nurbs

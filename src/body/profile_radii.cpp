@@ -74,7 +74,7 @@ struct Leaf {
 
 class Painter {
  public:
-  explicit Painter(double size) : size_(size), cell_(kProfileCells, kFarAway) {}
+  Painter(double size, double kink) : size_(size), kink_(kink), cell_(kProfileCells, kFarAway) {}
 
   // Paints a piece; false where its normals cannot be told.
   bool paint(const Meridian::Piece& piece, ProfileTurn turn) {
@@ -114,6 +114,7 @@ class Painter {
     return true;
   }
 
+  double kinks() const { return kinks_; }
   std::vector<float> radii() const {
     std::vector<float> least;
     for (const double x : cell_)
@@ -142,8 +143,11 @@ class Painter {
   }
 
   void fan(const Vec2& a, const Vec2& b) {
-    if (std::abs(std::atan2(a[0] * b[1] - a[1] * b[0], a.dot(b))) > kProfileKink)
+    const double angle = std::abs(std::atan2(a[0] * b[1] - a[1] * b[0], a.dot(b)));
+    if (angle > kink_)
       put(place_of(a), place_of(b), 0);
+    else if (angle > kProfileKink)
+      kinks_ += angle;
   }
   void put(double from, double to, double radius) {
     const Cells cells = cells_of(from, to);
@@ -195,7 +199,8 @@ class Painter {
     return examine(std::move(leaf), depth - 1) && examine(std::move(other), depth - 1);
   }
 
-  const double size_;
+  const double size_, kink_;
+  double kinks_ = 0;
   std::vector<double> cell_;  // radius over the body's size
   std::vector<End> ends_;
   double side_ = 1, noise_n_ = 0, noise_det_ = 0;
@@ -218,13 +223,14 @@ double ProfileRadii::within(double cosine, double sine, double reach) const {
   return radius;
 }
 
-ProfileRadii make_profile_radii(const Meridian& m, const std::vector<BezierPatch>& patches, double size) {
+ProfileRadii make_profile_radii(const Meridian& m, const std::vector<BezierPatch>& patches, double size,
+                                double kink) {
   if (m.empty()) return {};
-  Painter painter(size);
+  Painter painter(size, kink);
   for (const Meridian::Piece& piece : m.pieces)
     if (!painter.paint(piece, profile_turn(m, piece, patches, size))) return {};
   if (!painter.paint_kinks()) return {};
-  return {tree_of(painter.radii())};
+  return {tree_of(painter.radii()), painter.kinks()};
 }
 
 }  // namespace nurbs

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "body/meridian.h"
+#include "nurbs/tolerances.h"
 
 namespace nurbs {
 
@@ -15,18 +16,20 @@ namespace nurbs {
 struct ProfileRadii {
   // Lengths, of kProfileCells cells over the angle: a tree of minima, leaves last. Empty: nothing is known.
   std::vector<float> least;
+  double kinks = 0;  // rad: of those left out, all together, which the above does not hold within
 
   // For all angles within `reach` (rad) of the one of this cosine and sine; 0 where nothing is known.
   double within(double cosine, double sine, double reach) const;
 };
 template <class Archive>
 void archive(Archive& a, ProfileRadii& s) {
-  auto& [least] = s;
-  a(least);
+  auto& [least, kinks] = s;
+  a(least, kinks);
 }
 
-// Of an empty meridian empty. `patches` say which side is outside. About 1 ms.
+// Of an empty meridian empty. `patches` say which side is outside. Kinks up to `kink` are left out. About 1
+// ms.
 ProfileRadii make_profile_radii(const Meridian& meridian, const std::vector<BezierPatch>& patches,
-                                double size);
+                                double size, double kink = kProfileKink);
 
 }  // namespace nurbs

@@ -71,13 +71,14 @@ void add(Real factor, const Row& a, Row* sum) {
 }
 
 // How far points of the patch leave the arcs they should be on, a length; infinite where that is not small.
-double off_arcs(const BezierPatch& patch, bool arcs_in_u, const Revolution& about, double size) {
+// `noise`: what points of the axis may be off it by.
+double off_arcs(const BezierPatch& patch, bool arcs_in_u, const Revolution& about, double noise) {
   const Axes axes(about);
   const int n = arcs_in_u ? patch.degree_u : patch.degree_v;
   std::vector<Coordinates> lines;
   Real moved = 0;
   for (int i = 0; i <= n; ++i) {
-    lines.emplace_back(line_of(patch, arcs_in_u, i), axes, kArcError * size);
+    lines.emplace_back(line_of(patch, arcs_in_u, i), axes, noise);
     moved = std::max(moved, lines.back().moved);
   }
   const Coordinates& first = lines[0];
@@ -184,8 +185,8 @@ struct Normals {
 };
 
 // The axis that all rings are nearest to being about: three points of one of them know it to some round-offs
-// only.
-void settle_axis(const std::vector<BezierPatch>& patches, double size, Revolution* r) {
+// only. Lines that are off by more than `allowed`, a length, are none.
+void settle_axis(const std::vector<BezierPatch>& patches, double size, double allowed, Revolution* r) {
   const Axes axes(*r);
   Normals tilt, shift;
   for (const BezierPatch& patch : patches) {
@@ -203,17 +204,18 @@ void settle_axis(const std::vector<BezierPatch>& patches, double size, Revolutio
           const Real rise = axes.axis.dot(step), r0 = radius(ring[0]), rk = radius(ring[k]);
           off = std::max({off, std::abs(rise), std::abs(rk - r0)});
           tilted.add(axes.t.dot(step), axes.s.dot(step), -rise);
-          if (!(std::min(r0, rk) > kArcError * size)) continue;
+          if (!(std::min(r0, rk) > allowed)) continue;
           const Point e = (ring[k] - axes.point) / rk - (ring[0] - axes.point) / r0;
           shifted.add(axes.t.dot(e), axes.s.dot(e), rk - r0);
         }
       }
       least = std::min(least, off);
-      if (!(off <= kArcError * size)) continue;
+      if (!(off <= allowed)) continue;
       tilt = tilted;
       shift = shifted;
     }
-    if (least > kNoArcs * size && out_of_plane(patch, r->axis) > kNoArcs * size) return;  // no revolution
+    const double none = std::max(kNoArcs * size, allowed);
+    if (least > none && out_of_plane(patch, r->axis) > none) return;  // no revolution
   }
   r->axis = (axes.axis + tilt.solve(axes)).normalized().cast<double>();
   r->point = (axes.point + shift.solve(axes)).cast<double>();
@@ -246,24 +248,29 @@ double out_of_plane(const BezierPatch& patch, const Vec3& axis) {
   return high - low;
 }
 
-Revolution find_revolution(const std::vector<BezierPatch>& patches, const Ellipsoid& ellipsoid, double size) {
+Revolution find_revolution(const std::vector<BezierPatch>& patches, double size, double allowed) {
+  const double most = allowed * size;
   for (const bool arcs_in_u : {true, false}) {
     Revolution r;
     if (!guess_axis(patches, arcs_in_u, &r)) continue;
-    for (int pass = 0; pass < 2; ++pass) settle_axis(patches, size, &r);  // the tilt moves the points
+    for (int pass = 0; pass < 2; ++pass) settle_axis(patches, size, most, &r);  // the tilt moves the points
     for (const BezierPatch& patch : patches) {
       double error = out_of_plane(patch, r.axis);
-      if (error > kArcError * size)
-        error = std::min(off_arcs(patch, true, r, size), off_arcs(patch, false, r, size));
+      if (error > most) error = std::min(off_arcs(patch, true, r, most), off_arcs(patch, false, r, most));
       r.error = std::max(r.error, error);
-      if (!(r.error <= kArcError * size)) break;
+      if (!(r.error <= most)) break;
     }
-    if (!(r.error <= kArcError * size)) continue;
+    if (!(r.error <= most)) continue;
     r.found = true;
     r.error *= 2;  // there and back
     return r;
   }
-  return about_axis_of(ellipsoid, size);
+  return {};
+}
+
+Revolution find_revolution(const std::vector<BezierPatch>& patches, const Ellipsoid& ellipsoid, double size) {
+  const Revolution r = find_revolution(patches, size, kArcError);
+  return r.found ? r : about_axis_of(ellipsoid, size);
 }
 
 }  // namespace nurbs

@@ -29,6 +29,9 @@ void archive(Archive& a, Revolution& s) {
 // other parameters are not found. `size`: bounding radius.
 Revolution find_revolution(const std::vector<BezierPatch>& patches, const Ellipsoid& ellipsoid, double size);
 
+// The same of arcs that may be off by `allowed` of the size, and whatever the body is else.
+Revolution find_revolution(const std::vector<BezierPatch>& patches, double size, double allowed);
+
 // By how much the heights of a patch's control points along `axis`, unit, differ: 0 in a plane square to it.
 double out_of_plane(const BezierPatch& patch, const Vec3& axis);
 

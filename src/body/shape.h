@@ -18,6 +18,7 @@
 #include "body/flat_faces.h"
 #include "body/inner_map.h"
 #include "body/meridian.h"
+#include "body/near_revolution.h"
 #include "body/normal_map.h"
 #include "body/profile_radii.h"
 #include "body/revolution.h"
@@ -180,6 +181,7 @@ struct Shape {
   Ellipsoid ellipsoid;                  // that the body is, if it is one
   Revolution revolution;                // about an axis, if the body is one
   Meridian meridian;                    // whose profile this is; empty for other bodies
+  NearRevolution near_revolution;       // what few digits keep the body from being
   ProfileRadii profile_radii;           // of that
   SpheroPolyhedron core;                // hull of points, and a ball, that the body is, if it is one
   BallHull ball_hull;                   // of a few balls, that the body is, if it is one

@@ -35,6 +35,21 @@ constexpr int kBeside = 3;              // circles looked at on either side of a
 constexpr double kNearAzimuth = 0.3;    // rad, of a circle's asked azimuth
 constexpr double kChord = 1.05;         // up to 0.5 rad: no less than the angle over its chord or sine
 constexpr double kWidestSecond = 0.88;  // cosine of that
+constexpr int kRippledCost = 3;         // sectors, as one of rippled circles, ...
+constexpr double kFollowedCost = 25;    // ... besides one for so many that are followed
+constexpr double kOnPaceRippled = 3;
+constexpr double kSameAngle = 1e-13;  // rad
+constexpr double kOffRipple = 3;      // times the most it is off by, a circle is known all round
+constexpr double kRippleShare = 0.2;  // of the tolerance, up to which rippled circles are followed anyway
+constexpr double kLeastSine = 0.02;   // up to which lengths are taken off radii instead
+
+// About which a body is one, if only nearly.
+const Revolution& revolution_of(const Shape& shape) {
+  return shape.revolution.found ? shape.revolution : shape.near_revolution.revolution;
+}
+bool revolves(const Shape& shape) {
+  return shape.revolution.found || shape.near_revolution.found();
+}
 
 // One body of revolution K and its mate M: axes and lengths of the pair frame, e = sign d.
 struct View {
@@ -52,6 +67,11 @@ struct View {
   const SpheroPolyhedron* swept = nullptr;  // M, if it is one
   double error = 0;                         // of those that are
   const RoundEdges* arcs;                   // of K, where that is of revolution no further
+  const NearRevolution* near_k = nullptr;   // that K nearly is, if it is one no further ...
+  const NearRevolution* near_m = nullptr;   // ... and M, if its circles are used
+  Ripple ripple;                            // of both together ...
+  double seam = 0;                          // ... and where their patches meet
+  double turn_m_sign = 1;                   // of M's azimuth, as K's grows
 
   View(const PairFrame& pair, bool k_is_a, bool core, double tolerance, const RoundEdges* part) : arcs(part) {
     sign = k_is_a ? 1 : -1;
@@ -62,8 +82,10 @@ struct View {
     turn_k = k_is_a ? Mat3(Mat3::Identity()) : pair.turn;
     turn_m = k_is_a ? pair.turn : Mat3(Mat3::Identity());
     offset = sign * pair.offset;
-    axis = (turn_k * (arcs ? arcs->axis : k->revolution.axis)).normalized();
-    point = scale_k * (turn_k * (arcs ? arcs->point : k->revolution.point));
+    if (!arcs && !k->revolution.found) near_k = &k->near_revolution;
+    axis = (turn_k * (arcs ? arcs->axis : revolution_of(*k).axis)).normalized();
+    point = scale_k * (turn_k * (arcs ? arcs->point : revolution_of(*k).point));
+    if (near_k) add_ripple(*near_k, scale_k);
     if (m->proofs.sphere) {  // any axis is its own
       mate_axis = axis;
       mate_point = Vec3::Zero();
@@ -71,21 +93,45 @@ struct View {
       mate_error = m->bounding_radius - m->inner_radius;
       return;
     }
-    mate_axis = (turn_m * m->revolution.axis).normalized();
-    if (mate_axis.dot(axis) < 0) mate_axis = -mate_axis;
-    mate_point = scale_m * (turn_m * m->revolution.point);
+    const Revolution& mate = revolution_of(*m);
+    mate_axis = (turn_m * mate.axis).normalized();
+    if (mate_axis.dot(axis) < 0) {
+      mate_axis = -mate_axis;
+      turn_m_sign = -1;
+    }
+    mate_point = scale_m * (turn_m * mate.point);
     mate_error = m->revolution.error + m->meridian.error;
     const double sine = axis.cross(mate_axis).norm();
-    circles = m->revolution.found && sine < kNearAxis;
+    circles = mate.found && sine < kNearAxis;
     if (circles) tilt = sine;
-    if (!core) return;
+    if (circles && !m->revolution.found) {
+      near_m = &m->near_revolution;
+      add_ripple(*near_m, scale_m);
+      mate_error = 0;
+    }
+    if (!core || near_m) return;
     ball = kCore * PairFrame::rolling_ball(*m, scale_m, tolerance);
-    ball_k = kCore * PairFrame::rolling_ball(*k, scale_k, tolerance);
+    if (!near_k) ball_k = kCore * PairFrame::rolling_ball(*k, scale_k, tolerance);
     if (PairFrame::is_swept(*m, scale_m, tolerance)) swept = &m->core;
     for (const auto& [shape, scale] : {std::pair(m, scale_m), std::pair(k, scale_k)})
       if (PairFrame::is_swept(*shape, scale, tolerance)) error += scale * shape->core.error;
   }
   Vec3 across(const Vec3& x) const { return x - axis.dot(x) * axis; }
+  bool rippled() const { return near_k || near_m; }
+  void use_points() {  // of M
+    circles = false;
+    tilt = 0;
+    near_m = nullptr;
+    ripple = {};
+    seam = 0;
+    if (near_k) add_ripple(*near_k, scale_k);
+  }
+
+ private:
+  void add_ripple(const NearRevolution& near, double scale) {
+    ripple.add(scale, near.meridian.ripple);
+    seam += scale * near.meridian.seam;
+  }
 };
 
 // What one support evaluation says of every direction.
@@ -98,6 +144,15 @@ struct Circle {
   Vec3 nk, nm;  // the surfaces' own normals there, outward from K and into M
   Vec3 on_k;    // K's point, from `point`: of a circle, or an arc of one; or, `lone`, no other is known
   bool lone = false;
+  Meridian::Place place_k, place_m;  // of rippled ones, whose normals are the products'
+};
+
+// How rippled circles change from the azimuth they were asked for, as K's grows by a rad; those of M by their
+// radius and the height over M's centre. One patch each from `before` to `after` (rad, not negative).
+struct Wave {
+  double phi = 0, k_r = 0, k_z = 0, m_r = 0, m_z = 0, before = -1, after = -1;
+  Ripple ripple;  // of both bodies' lines
+  double steep() const { return std::hypot(k_r, k_z) + std::hypot(m_r, m_z); }
 };
 
 // What projections need of it, apart: they go through all.
@@ -111,6 +166,7 @@ struct FlatCircle {
   double rm;
   bool lone;
   Flat whole, alone;  // as a circle, and as its point
+  Wave wave;
 };
 
 double square(double x) {
@@ -129,7 +185,9 @@ class RingSearch {
     second_ = view_.axis.cross(tangent_);
     noise_ = 2 * kRoundoff *
                  (view_.scale_k * view_.k->bounding_radius + view_.scale_m * view_.m->bounding_radius) +
-             view_.scale_k * (arcs ? arcs->error : view_.k->revolution.error + view_.k->meridian.error) +
+             view_.scale_k * (arcs           ? arcs->error
+                              : view_.near_k ? 0.0
+                                             : view_.k->revolution.error + view_.k->meridian.error) +
              (view_.circles ? view_.scale_m * view_.mate_error : 0.0) + view_.error;
   }
 
@@ -147,6 +205,7 @@ class RingSearch {
     on_m_ = last_m_;
     const double alike = differ() / (view_.scale_k * view_.k->bounding_radius);
     if (!(alike < (last ? kHardlyAlike : kNearlyAlike))) return false;
+    if (last && view_.rippled() && alike < kNearlyAlike) return false;  // tried
     const Sector all = sector_at(azimuth(e), M_PI);
     for (int k = 0; k < kFirstAngles; ++k) {
       const double angle = M_PI * k / (kFirstAngles - 1);
@@ -197,8 +256,7 @@ class RingSearch {
     if (!(view_.tilt > kLeastTilt)) return;
     const double circles = differ();
     const View before = view_;
-    view_.circles = false;
-    view_.tilt = 0;
+    view_.use_points();
     count_ = 0;
     query(e);
     if (differ() <= circles) return;
@@ -216,26 +274,29 @@ class RingSearch {
                                         enough / view_.scale_m, kHullSlope);
     ++queries_;
     Circle c;
-    const Vec3 x = view_.turn_k * (view_.scale_k * k.point - view_.ball_k * k.normal),
-               xm = view_.turn_m * mate_core(m, view_.turn_m.transpose() * -e);
-    c.on_k = x - view_.point;
-    c.z = view_.axis.dot(c.on_k);
-    c.r = view_.across(c.on_k).norm();
-    c.lone = view_.arcs && !on_arcs(c);
-    c.at = {view_.axis.dot(e), view_.across(e).norm()};
+    Vec3 x = view_.turn_k * (view_.scale_k * k.point - view_.ball_k * k.normal),
+         xm = view_.turn_m * mate_core(m, view_.turn_m.transpose() * -e);
     c.nk = view_.turn_k * k.normal;
     c.nm = view_.turn_m * -m.normal;
+    c.r = c.rm = kFarAway;  // unless known with their signs
+    const Wave wave = wave_along(e, k.where, m.where, &c, &x, &xm);
+    c.on_k = x - view_.point;
+    c.z = view_.axis.dot(c.on_k);
+    if (!(c.r < kFarAway)) c.r = view_.across(c.on_k).norm();
+    c.lone = view_.arcs && !on_arcs(c);
+    c.at = {view_.axis.dot(e), view_.across(e).norm()};
     c.middle = xm;
-    c.rm = 0;
-    if (view_.circles) {
+    if (!view_.circles) {
+      c.rm = 0;
+    } else {
       const Vec3 from = xm - view_.mate_point;
       c.middle = view_.mate_point + view_.mate_axis.dot(from) * view_.mate_axis;
-      c.rm = (xm - c.middle).norm();
+      if (!(c.rm < kFarAway)) c.rm = (xm - c.middle).norm();
     }
     c.k = view_.offset - view_.point + c.middle;
     const double around = c.at.s > 0 ? 1 / c.at.s : 0;
     const Angle u{around * tangent_.dot(e), around * second_.dot(e)};
-    flat_[count_] = {c.at, u, c.rm, c.lone, flat(c.r, c.z, c.k), flat(0, 0, c.k - c.on_k)};
+    flat_[count_] = {c.at, u, c.rm, c.lone, flat(c.r, c.z, c.k), flat(0, 0, c.k - c.on_k), wave};
     insert(c);
     const double p = view_.scale_k * k.upper + view_.scale_m * m.upper - balls() - e.dot(view_.offset);
     last_ = p;
@@ -248,6 +309,45 @@ class RingSearch {
       on_m_ = last_m_;
     }
     return true;
+  }
+
+  // Of rippled bodies points on parameter lines round the axis take the supports' places.
+  Wave wave_along(const Vec3& e, const SurfacePoint& on_k, const SurfacePoint& on_m, Circle* c, Vec3* x,
+                  Vec3* xm) const {
+    Wave wave;
+    if (!view_.rippled()) return wave;
+    wave.phi = azimuth(e);
+    wave.before = wave.after = M_PI;
+    const auto take = [&](const Shape& shape, double scale, const Mat3& turn, const SurfacePoint& support,
+                          double sign, double turns, Vec3* at, Vec3* normal, Meridian::Place* place,
+                          double* r, double* slope_r, double* slope_z) {
+      const NearRevolution& near = shape.near_revolution;
+      const Vec3 own = turn.transpose() * (sign * e);
+      RoundPoint on;
+      if (!find_round_point(near.meridian, shape.patches, own, shape.bounding_radius, support, &on)) {
+        wave.before = wave.after = -1;
+        return;
+      }
+      const Vec3 axis = near.revolution.axis, across = (own - axis.dot(own) * axis).normalized();
+      // In the half plane: how far it is off that says nothing of the distance from the axis.
+      *at = scale * (turn * (near.meridian.point + on.r * across + on.z * axis));
+      *r = scale * on.r;
+      *normal = sign * (turn * (on.profile.turn_r * across + on.profile.turn_z * axis));
+      *place = on.profile.place;
+      *slope_r = turns * scale * on.slope_r;
+      *slope_z = scale * on.slope_z;
+      wave.ripple.add(scale, on.ripple);
+      wave.before = std::min(wave.before, turns > 0 ? on.before : on.after);
+      wave.after = std::min(wave.after, turns > 0 ? on.after : on.before);
+    };
+    if (view_.near_k)
+      take(*view_.k, view_.scale_k, view_.turn_k, on_k, 1, 1, x, &c->nk, &c->place_k, &c->r, &wave.k_r,
+           &wave.k_z);
+    if (view_.near_m)
+      take(*view_.m, view_.scale_m, view_.turn_m, on_m, -1, view_.turn_m_sign, xm, &c->nm, &c->place_m,
+           &c->rm, &wave.m_r, &wave.m_z);
+    if (wave.before < 0) wave.ripple = view_.ripple;
+    return wave;
   }
 
   Flat flat(double r, double z, const Vec3& k) const {
@@ -280,6 +380,10 @@ class RingSearch {
     const double reach = std::max(kNearAzimuth, 2 * half);
     const Angle& u = sector.u;
     const auto near = [&](const FlatCircle& c) {
+      if (view_.rippled()) {
+        const double beyond = std::abs(std::remainder(sector.phi - c.wave.phi, 2 * M_PI)) - 2 * half;
+        return !(beyond > 0) || c.wave.ripple.bend * beyond * beyond <= 2 * kRippleShare * tolerance_;
+      }
       return (view_.circles && !c.lone) || reach > 1 || c.at.s == 0 ||
              2 - 2 * (c.u.c * u.c + c.u.s * u.s) <= square(reach);
     };
@@ -339,6 +443,44 @@ class RingSearch {
     return {sine, b.cross(cross) / sine};
   }
 
+  // A rippled circle at the azimuths within `half` of a sector's middle: that middle from where it was asked
+  // for, if it is followed there, and what a direction loses besides at most. Those of M turn about M's axis:
+  // |d psi / d phi - 1|, |d psi / d alpha| <= tilt / |e x b|.
+  struct Drift {
+    bool followed = false;
+    double turn = 0, lost = 0;
+  };
+  Drift drift(const Wave& w, const Angle& at, const Sector& sector, double half, const Reach& over) const {
+    if (!view_.rippled()) return {};
+    Drift d{false, std::remainder(sector.phi - w.phi, 2 * M_PI), kOffRipple * w.ripple.most};
+    double furthest = std::abs(d.turn) + half, tilted = 0;
+    if (view_.near_m && view_.tilt > 0) {
+      if (!(over.across > 0)) return d;
+      double chord = 0;
+      for (const Angle& a : {sector.low, sector.high})
+        chord = std::max(chord, std::hypot(a.c - at.c, a.s - at.s));
+      tilted = view_.tilt / over.across * (furthest + M_PI_2 * chord);
+      furthest += tilted;
+    }
+    if (w.before < 0) return d;
+    const double beyond =
+        std::max({0.0, half + tilted - d.turn - w.before, d.turn + half + tilted - w.after});
+    double lost = 0.5 * w.ripple.bend * square(furthest) + w.steep() * tilted;
+    if (beyond > 0) lost += (w.ripple.slope + w.steep()) * beyond + view_.seam;
+    if (!(lost < d.lost)) return d;
+    d.followed = true;
+    d.lost = lost;
+    return d;
+  }
+
+  void follow(const Wave& w, double turn, Circle* c) const {
+    c->r += turn * w.k_r;
+    c->z += turn * w.k_z;
+    c->rm += turn * w.m_r;
+    c->k += turn * w.m_z * view_.mate_axis;
+    c->middle += turn * w.m_z * view_.mate_axis;
+  }
+
   // Whether the circles are known for azimuths within `half` of phi.
   bool reaches(double phi, double half) const { return !view_.arcs || view_.arcs->holds(phi, half); }
   // A circle as far as it goes: beyond the azimuths of an arc its point alone.
@@ -359,6 +501,8 @@ class RingSearch {
     const bool reaches = this->reaches(sector.phi, half);
     const Vec3 b = mate_axis_from(u);
     hull_.clear();
+    lost_ = 0;
+    if (view_.rippled()) followed_ += chosen_;
     for (int i = 0; i < chosen_; ++i) {
       const FlatCircle& c = flat_[which_[i]];
       const Flat& k = reaches && !c.lone ? c.whole : c.alone;
@@ -367,13 +511,27 @@ class RingSearch {
       const bool inside = half >= M_PI || along >= turn.c * k.length;
       const double reach =
           half > 0 ? (inside ? k.length : along * turn.c + std::abs(across) * turn.s) : along;
-      double r = k.r - reach, z = k.z;
-      if (c.rm > 0) {
+      const Drift drift = this->drift(c.wave, c.at, sector, half, over);
+      double r = k.r - reach, z = k.z, rm = c.rm;
+      if (drift.followed) {
+        r += drift.turn * (c.wave.k_r - c.wave.m_z * b[0]);
+        z += drift.turn * (c.wave.k_z - c.wave.m_z * b[2]);
+        rm += drift.turn * c.wave.m_r;
+      }
+      double most = drift.lost + (drift.followed ? half * c.wave.steep() : 0);
+      if (rm < 0) most -= rm;  // beyond the axis
+      if (rm > 0) {
         const Facing m = facing(c.at, b);
         if (m.sine > kNoDirection) {  // else the tangent plane 0
-          r += c.rm * (m.point[0] - lost);
-          z += c.rm * m.point[2];
+          r += rm * (m.point[0] - lost);
+          z += rm * m.point[2];
         }
+      }
+      if (most > 0) {
+        if (over.sine > kLeastSine)
+          r -= most / over.sine;
+        else
+          lost_ = std::max(lost_, most);
       }
       hull_.add(r, z);
     }
@@ -389,6 +547,7 @@ class RingSearch {
       for (int i = 0; i < chosen_; ++i) widest = std::max(widest, circle_[which_[i]].rm);
       turned = this->turned(over, half, widest);
     }
+    turned += lost_;
     Least least =
         hull_.least(sector.low, sector.high, threshold + turned + noise_, 4 * kRoundoff * pair_.reach);
     least.value -= turned + noise_;
@@ -423,10 +582,18 @@ class RingSearch {
     return std::max(radius, least_bend(shape, e, (axis - cosine * e) / sine, reach, false));
   }
 
+  // A ball's radius, if it leaves enough of the tolerance.
+  double worth(const ProfileBall& ball, double scale, double* off) const {
+    if (!(scale * ball.off <= kRippleShare * tolerance_)) return 0;
+    *off += scale * ball.off;
+    return scale * ball.radius;
+  }
+
   // Balls that touch two circles from inside, wherever they and the sector's directions lie on the meridians:
   // their centres take the circles' place. Returns the sum of the balls' radii, K's and M's.
+  // `off`: what that is less by.
   double round_off(const Sector& sector, const Angle& at, const Vec3& u, const Reach& over, Circle* one,
-                   Circle* two) const {
+                   Circle* two, double* off) const {
     // By how much angles from an axis differ, as chords.
     const auto apart = [](const Vec3& axis, const Vec3& x, const Vec3& y) {
       const double s = x.cross(axis).norm() - y.cross(axis).norm(), c = axis.dot(x - y);
@@ -439,7 +606,12 @@ class RingSearch {
     for (const Circle* c : {one, two}) asked = std::max(asked, apart(view_.axis, c->nk, e));
     const Mat3 to_k = view_.turn_k.transpose(), to_m = view_.turn_m.transpose();
     double of_k = 0;
-    if (!view_.arcs)
+    if (view_.near_k) {
+      const ProfileBall ball =
+          ball_within(view_.k->near_revolution, to_k * e, kChord * std::max(range, asked), one->place_k,
+                      two->place_k, view_.k->bounding_radius);
+      of_k = worth(ball, view_.scale_k, off);
+    } else if (!view_.arcs)
       of_k =
           view_.scale_k * meridian_bend(*view_.k, to_k * e, view_.k->revolution.axis, std::max(range, asked));
     of_k = std::max(0.0, of_k - view_.ball_k);
@@ -447,14 +619,21 @@ class RingSearch {
       c->r -= of_k * view_.across(c->nk).norm();
       c->z -= of_k * c->nk.dot(view_.axis);
     }
-    double of_m;
+    double of_m = 0;
     asked = 0;
     if (view_.circles) {
       const Vec3& axis = view_.mate_axis;
       for (const Circle* c : {one, two}) asked = std::max(asked, apart(axis, c->nm, e));
       range += view_.tilt * sector.half / over.across;
-      const Vec3 own = view_.m->proofs.sphere ? Vec3(to_m * axis) : view_.m->revolution.axis;
-      of_m = view_.scale_m * meridian_bend(*view_.m, to_m * -e, own, std::max(range, asked));
+      if (view_.near_m) {
+        const ProfileBall ball =
+            ball_within(view_.m->near_revolution, to_m * -e, kChord * std::max(range, asked), one->place_m,
+                        two->place_m, view_.m->bounding_radius);
+        of_m = worth(ball, view_.scale_m, off);
+      } else {
+        const Vec3 own = view_.m->proofs.sphere ? Vec3(to_m * axis) : view_.m->revolution.axis;
+        of_m = view_.scale_m * meridian_bend(*view_.m, to_m * -e, own, std::max(range, asked));
+      }
       of_m = std::max(0.0, of_m - view_.ball);
       for (const Circle* c : {one, two}) of_m = std::min(of_m, c->rm / c->nm.cross(axis).norm());
       for (Circle* c : {one, two}) {
@@ -491,10 +670,11 @@ class RingSearch {
     *narrower = too_far(sector.low) || too_far(sector.high);
     if (*narrower) return -kFarAway;
     const Reach over = reach_of(sector);
+    const Vec3 b = mate_axis_from(sector.u);
     Facing m{1, Vec3::Zero()};
     double turned = 0;
     if (view_.circles) {
-      m = facing(here.at, mate_axis_from(sector.u));
+      m = facing(here.at, b);
       turned = s * m.point[1];
       if (!(over.across > 0.5 * over.sine)) return -kFarAway;
     }
@@ -507,10 +687,32 @@ class RingSearch {
                    f = circle.rm * turned - s * circle.k.dot(across);
       return Slope{ps * s + pc * c, ps * c - pc * s, f};
     };
-    Circle one = known(circle_[which_[here.from]], sector.phi, sector.half),
-           two = known(circle_[which_[here.to]], sector.phi, sector.half);
-    const double round = round_off(sector, here.at, u, over, &one, &two);
-    const Slope x = slope(one), y = slope(two);
+    double rippled = 0, steep = 0;
+    const auto at_sector = [&](int k, double* wave_slope) {
+      Circle circle = known(circle_[k], sector.phi, sector.half);
+      const Wave& w = flat_[k].wave;
+      const Drift drift = this->drift(w, circle.at, sector, sector.half, over);
+      rippled = std::max(rippled, drift.lost);
+      *wave_slope = 0;
+      if (!drift.followed) return circle;
+      steep = std::max(steep, w.steep());
+      *wave_slope = s * w.k_r + c * w.k_z + m.sine * w.m_r - w.m_z * (s * b[0] + c * b[2]);
+      follow(w, drift.turn, &circle);
+      return circle;
+    };
+    const auto within_axis = [&](Circle circle) {  // circles of M that go beyond it are points
+      rippled = std::max(rippled, rippled - circle.rm);
+      circle.rm = std::max(0.0, circle.rm);
+      return circle;
+    };
+    double wave_x, wave_y;
+    Circle one = within_axis(at_sector(which_[here.from], &wave_x)),
+           two = within_axis(at_sector(which_[here.to], &wave_y));
+    double off = 0;
+    const double round = round_off(sector, here.at, u, over, &one, &two, &off) - rippled - off;
+    Slope x = slope(one), y = slope(two);
+    x.f += wave_x;
+    y.f += wave_y;
     const double share = x.t * y.t < 0 ? y.t / (y.t - x.t) : x.q > y.q ? 1.0 : 0.0;
     const double q = share * x.q + (1 - share) * y.q, t = share * x.t + (1 - share) * y.t,
                  f = share * x.f + (1 - share) * y.f, rho = share * one.rm + (1 - share) * two.rm;
@@ -522,7 +724,8 @@ class RingSearch {
                  near = h < 1 ? (facing > 0 ? facing * (1 - 0.5 * h * h) : facing) - along * h : -k.norm();
     const double bend = -(near > 0 ? over.sine * near : near) +
                         rho * tilt * ((tilt + cosine) * inverse + tilt * cube),
-                 twist = over.cosine * along + rho * tilt * ((1 + cosine * over.cosine) * inverse + cube);
+                 twist = over.cosine * along + rho * tilt * ((1 + cosine * over.cosine) * inverse + cube) +
+                         kChord * steep;
     // Along the angles a sine, least at an end or, where it bends upwards, in between.
     double least = kFarAway;
     for (const double side : {t - kChord * twist * h, t + kChord * twist * h}) {
@@ -537,23 +740,56 @@ class RingSearch {
     }
     // Where the azimuth bends it upwards it has its least value inside.
     const double lost = -bend * h > std::abs(f) ? -0.5 * f * f / bend : std::abs(f) * h + 0.5 * bend * h * h;
-    *narrower = q - least > lost;
+    *narrower = q - least > lost + rippled;
     return round + least - lost - noise_;
   }
 
+  // A rippled circle may be known in one direction only.
+  bool was_asked(const Angle& at, const Sector& sector) const {
+    if (!view_.rippled()) return false;
+    return std::any_of(which_, which_ + chosen_, [&](int k) {
+      return std::abs(cross(flat_[k].at, at)) <= kSameAngle &&
+             std::abs(std::remainder(sector.phi - flat_[k].wave.phi, 2 * M_PI)) <= kSameAngle;
+    });
+  }
+
+  // Rippled circles tell of azimuths near theirs, and those of sectors that are closed are done with.
+  void forget_far_from(const Sector& sector) {
+    const auto off = [&](const FlatCircle& c) {
+      return std::abs(std::remainder(sector.phi - c.wave.phi, 2 * M_PI));
+    };
+    double offs[kMostCircles];
+    for (int k = 0; k < count_; ++k) offs[k] = off(flat_[k]);
+    std::nth_element(offs, offs + kMostCircles / 2, offs + count_);
+    const double furthest = offs[kMostCircles / 2];
+    const int before = count_;
+    count_ = 0;
+    for (int k = 0; k < before; ++k) {
+      if (off(flat_[k]) > furthest) continue;
+      const Circle kept = circle_[k];
+      flat_[count_] = flat_[k];
+      insert(kept);
+    }
+    dropped_ += before - count_;
+  }
+
   bool close(const Sector& all, bool last, double* left) {
-    const double most_spent = last ? kMostSpentLast : kMostSpent,
-                 most_compared = last ? kMostComparedLast : kMostCompared,
-                 first_spent = last ? kFirstSpentLast : kFirstSpent;
+    const bool ample = last || view_.rippled();  // which are tried but once
+    const double most_spent = ample ? kMostSpentLast : kMostSpent,
+                 most_compared = ample ? kMostComparedLast : kMostCompared,
+                 first_spent = ample ? kFirstSpentLast : kFirstSpent;
     Sector stack[kDeepestSector + 2];
     int top = 0, sectors = 0;
     double closed = 0;
     stack[top++] = all;
     proven_ = kFarAway;
     while (top > 0) {
+      sectors += view_.rippled() ? kRippledCost : 1;
       const double spent =
-          std::max((++sectors + kCircleCost * count_) / most_spent, compared_ / most_compared);
-      const double allowed = last ? std::max(*left, kOnPace * closed) : *left;
+          std::max((sectors + kCircleCost * (count_ + dropped_) + followed_ / kFollowedCost) / most_spent,
+                   compared_ / most_compared);
+      const double pace = view_.rippled() ? kOnPaceRippled : kOnPace,
+                   allowed = ample ? std::max(*left, pace * closed) : *left;
       if (spent > allowed || (spent > first_spent && closed < kHopeless * spent)) {
         *left -= spent;
         return false;
@@ -571,7 +807,7 @@ class RingSearch {
       sector.low = wide.low;
       sector.high = wide.high;
       const Least here = bound(sector, 0, threshold);
-      bool narrower;
+      bool narrower = false;
       const double second = second_order(sector, here, &narrower);
       if (second >= threshold) {
         proven_ = std::min(proven_, second);
@@ -579,7 +815,7 @@ class RingSearch {
         --top;
         continue;
       }
-      if (here.value >= best_ - kMeridianShare * tolerance_) {
+      if (here.value >= best_ - kMeridianShare * tolerance_ || was_asked(here.at, sector)) {
         if (top > kDeepestSector) return false;
         sector.share *= 0.5;
         Sector other = sector;
@@ -592,8 +828,9 @@ class RingSearch {
           other.move(1);
         }
         stack[top++] = other;
-      } else if (!query(direction(here.at, sector.u))) {
-        return false;
+      } else {
+        if (count_ == kMostCircles && view_.rippled()) forget_far_from(sector);
+        if (!query(direction(here.at, sector.u))) return false;
       }
     }
     return best_ - proven_ <= tolerance_;
@@ -609,14 +846,18 @@ class RingSearch {
     r->points.na = d;
     r->points.nb = -d;
     const Sector there = sector_at(azimuth(best_e_), 0);
+    if (dropped_ > 0) {  // the best direction's, it may be
+      if (count_ == kMostCircles) forget_far_from(there);
+      query(best_e_);
+    }
     const Least least = bound(there, 0, -kFarAway);
     // The circles level there, so weighted that the witnesses face each other.
     const auto slope = [&](int k) { return hull_.r(k) * least.at.c - hull_.z(k) * least.at.s; };
     const double tp = slope(least.from), tq = slope(least.to);
     const double share = tp != tq ? std::clamp(tq / (tq - tp), 0.0, 1.0) : 1.0;
     Vec3 xk, xm, yk, ym;
-    witness(circle_[which_[least.from]], there, &xk, &xm);
-    witness(circle_[which_[least.to]], there, &yk, &ym);
+    witness(which_[least.from], there, &xk, &xm);
+    witness(which_[least.to], there, &yk, &ym);
     const Vec3 on_k = share * xk + (1 - share) * yk, on_m = share * xm + (1 - share) * ym;
     const bool k_is_a = view_.sign > 0;
     r->points.a = k_is_a ? on_k : on_m;
@@ -627,7 +868,10 @@ class RingSearch {
     part_points(r);
   }
 
-  void witness(const Circle& c, const Sector& there, Vec3* on_k, Vec3* on_m) const {
+  void witness(int k, const Sector& there, Vec3* on_k, Vec3* on_m) const {
+    Circle c = circle_[k];
+    if (const Drift d = drift(flat_[k].wave, c.at, there, 0, reach_of(there)); d.followed)
+      follow(flat_[k].wave, d.turn, &c);
     const Vec3 at = known(c, there.phi, 0).lone ? c.on_k : Vec3(c.r * outward(there.u) + c.z * view_.axis);
     *on_k = view_.point + at + view_.ball_k * best_e_;
     *on_m = c.middle - view_.ball * best_e_;
@@ -644,8 +888,10 @@ class RingSearch {
   double best_ = kFarAway, proven_ = kFarAway, last_ = 0;
   Vec3 best_e_ = Vec3::UnitX();
   SurfacePoint on_k_, on_m_, last_k_, last_m_;
-  int count_ = 0, queries_ = 0;
+  int count_ = 0, dropped_ = 0, queries_ = 0;
   long compared_ = 0;  // circles, in plane hulls
+  long followed_ = 0;  // rippled ones
+  double lost_ = 0;    // of those in the hull, by ripples, where radii can't take it
   Circle circle_[kMostCircles];
   FlatCircle flat_[kMostCircles];
   short order_[kMostCircles];
@@ -660,10 +906,10 @@ bool search_about(const PairFrame& pair, bool k_is_a, const RoundEdges* arcs, do
   const double scale = k_is_a ? pair.scale_b : pair.scale_a;
   const bool round = PairFrame::rolling_ball(mate, scale, tolerance) > 0 && !mate.proofs.sphere;
   // Circles of a mate about nearly the same axis serve better, unless it ends in spheres.
-  const Vec3 of_k = arcs ? arcs->axis : k.revolution.axis,
-             axis = k_is_a ? Vec3(pair.turn * mate.revolution.axis) : mate.revolution.axis,
+  const Vec3 of_k = arcs ? arcs->axis : revolution_of(k).axis, of_mate = revolution_of(mate).axis,
+             axis = k_is_a ? Vec3(pair.turn * of_mate) : of_mate,
              own = k_is_a ? of_k : Vec3(pair.turn * of_k);
-  const bool near = mate.revolution.found && own.cross(axis).norm() < kNearAxis;
+  const bool near = revolves(mate) && own.cross(axis).norm() < kNearAxis;
   for (const bool core : {false, true})
     if ((core ? round : near || !round) &&
         RingSearch(pair, k_is_a, core, tolerance, arcs).run(last, left, result))
@@ -677,7 +923,7 @@ bool search_rings(const PairFrame& pair, double tolerance, bool last, PolytopeRe
   double left = kAllRings;
   for (const bool k_is_a : {true, false}) {
     const Shape& k = k_is_a ? *pair.a : *pair.b;
-    if (k.revolution.found && !k.proofs.sphere &&
+    if (revolves(k) && !k.proofs.sphere &&
         search_about(pair, k_is_a, nullptr, tolerance, last, &left, result))
       return true;
     for (const RoundEdges& arcs : k.round_edges)

@@ -90,7 +90,6 @@ constexpr double kNoDent = 1e-13;          // round-off of a difference of suppo
 constexpr double kHollowNoise = 2e-13;  // over the bounding radius: hollows of less curvature are no deeper
 constexpr int kPairsIfConvex = 1200, kPairsIfDented = 4000;  // samples compared with each other
 constexpr int kDentStarts = 1000;         // samples from which the best start of a support is taken
-constexpr int kTiltSections = 24;         // golden sections per direction in the search for the hull's plane
 constexpr double kWidestTilt = 2;         // tangent of the largest tilt of that plane against the surface
 constexpr int kMostCuts = 30;             // supports spent on one depth ...
 constexpr double kDepthTolerance = 1e-3;  // ... or until it is known to this, relatively
@@ -120,7 +119,9 @@ constexpr double kEllipsoid =
     5e-11;  // relative: a body this near an ellipsoid is one, where the tolerance allows
 
 // --- bodies of revolution
-constexpr double kArcError = 1e-10;  // of the body's size: what arcs about the axis may be off by
+constexpr double kArcError = 1e-10;       // of the body's size: what arcs about the axis may be off by ...
+constexpr double kNearRevolution = 1e-5;  // ... and of rippled bodies, from files of six digits and more,
+constexpr double kNearKink = 1e-4;        // rad: whose profiles' pieces are in line up to that
 
 // --- meridians
 constexpr double kMeridianError = 1e-10;   // of the body's size: patches this near a profile times an arc

@@ -1,6 +1,7 @@
 // See insertion_site.h.
 #include "scene/insertion_site.h"
 
+#include <algorithm>
 #include <cmath>
 
 #include "contact/pair_search.h"
@@ -9,6 +10,7 @@ namespace nurbs {
 
 namespace {
 
+constexpr double kMostStoodIn = 4096;  // that a body stands in
 constexpr double kTolerance = 1e-6;  // of the gap, over the smaller bounding radius: closer counts as overlap
 
 double reach_of(const Particle& body) {
@@ -30,6 +32,7 @@ void InsertionSite::clear(double size) {
   cell_ = 2 * size;
   bodies_.clear();
   cells_.clear();
+  large_.clear();
   asked_.clear();
   question_ = 0;
 }
@@ -41,6 +44,12 @@ InsertionSite::Cells InsertionSite::cells_of(const Particle& body) const {
     cells.high[k] = static_cast<std::int64_t>(std::floor((body.x[k] + reach_of(body)) / cell_));
   }
   return cells;
+}
+
+bool InsertionSite::many(const Cells& cells) {
+  double count = 1;
+  for (int k = 0; k < 3; ++k) count *= static_cast<double>(cells.high[k] - cells.low[k] + 1);
+  return count > kMostStoodIn;
 }
 
 // Calls visit(key) until it returns false.
@@ -56,7 +65,12 @@ void InsertionSite::add(const Particle& body) {
   const int number = count();
   bodies_.push_back(body);
   asked_.push_back(0);
-  for_each_cell(cells_of(body), [&](std::uint64_t cell) {
+  const Cells cells = cells_of(body);
+  if (many(cells)) {
+    large_.push_back(number);
+    return;
+  }
+  for_each_cell(cells, [&](std::uint64_t cell) {
     cells_[cell].push_back(number);
     return true;
   });
@@ -76,9 +90,17 @@ bool InsertionSite::meets(const Particle& a, const Particle& b, Overlap judge) c
 }
 
 bool InsertionSite::overlaps(const Particle& body, Overlap judge) const {
+  const auto in_the_way = [&](int number) { return meets(bodies_[number], body, judge); };
+  if (std::any_of(large_.begin(), large_.end(), in_the_way)) return true;
+  const Cells cells = cells_of(body);
+  if (many(cells)) {
+    for (int number = 0; number < count(); ++number)
+      if (in_the_way(number)) return true;
+    return false;
+  }
   ++question_;
   bool found = false;
-  for_each_cell(cells_of(body), [&](std::uint64_t cell) {
+  for_each_cell(cells, [&](std::uint64_t cell) {
     const auto entry = cells_.find(cell);
     if (entry == cells_.end()) return true;
     for (const int number : entry->second) {

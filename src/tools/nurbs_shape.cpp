@@ -451,7 +451,7 @@ const std::vector<Maker>& makers() {
        make_capsule,
        "--radius 0.003 --length 0.01"},
       {"tablet",
-       "exact: cylinder with rounded rims, axis z; with --cap biconvex",
+       "exact: cylinder with rounded rims, axis z; biconvex with --cap, the radius of its domes",
        {kOuter,
         {"--height", "H",
          "of the whole tablet from face to face; with --cap of its cylindrical band alone, 0 for none", true},

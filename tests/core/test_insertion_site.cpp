@@ -78,5 +78,30 @@ TEST(InsertionSite, tells_spheres_at_a_hair) {
   EXPECT_FALSE(site.overlaps(ball, Overlap::exact));
 }
 
+// A shape file in mm among grains in m, say: laid out over cells made for the grains it would fill the
+// memory.
+TEST(InsertionSite, holds_a_body_thousands_of_times_as_large) {
+  InsertionSite site;
+  site.clear(1);
+  Particle large;
+  large.shape = sphere().get();
+  large.scale = 3e4;
+  large.x = Vec3(3e4, 0, 0);
+  Particle grain;
+  grain.shape = sphere().get();
+  grain.x = Vec3(-5, 0, 0);
+  site.add(grain);
+  EXPECT_FALSE(site.overlaps(large, Overlap::exact));
+  grain.x.x() = -0.5;
+  EXPECT_FALSE(site.overlaps(grain, Overlap::exact));
+  site.add(large);
+  EXPECT_TRUE(site.overlaps(grain, Overlap::exact));
+  EXPECT_TRUE(site.overlaps(large, Overlap::sphere));
+  grain.x.x() = -1.001;
+  grain.x.y() = 40;  // beside the first
+  EXPECT_FALSE(site.overlaps(grain, Overlap::exact));
+  EXPECT_EQ(site.count(), 2);
+}
+
 }  // namespace
 }  // namespace nurbs

@@ -2,9 +2,12 @@
 // none.
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <cmath>
 #include <memory>
 #include <vector>
 
+#include "body/near_revolution.h"
 #include "body/support.h"
 #include "shapes/revolved.h"
 #include "support/bodies.h"
@@ -138,6 +141,102 @@ TEST(Meridian, is_kept_with_its_error_where_a_body_is_a_little_off_round) {
   }
   EXPECT_LT(most, 2 * near->meridian.error + 1e-14);
   EXPECT_GT(near->meridian.error, 2e-13);
+}
+
+// Bodies of revolution whose files have few digits: solid, decimals.
+std::vector<ShapePointer> rippled_bodies(Random& random) {
+  std::vector<ShapePointer> all;
+  for (const int decimals : {9, 8, 7, 6})
+    for (const std::vector<NurbsSurface>& surfaces :
+         {test::cone(random, 1.5, 1).shape->surfaces, test::double_cone(random, 1, 0.4, 0.8).shape->surfaces,
+          test::capsule(random, 0.5, 0.3).shape->surfaces, test::lens(random, 1.5).shape->surfaces,
+          egg(1, 0.8, 1.5), test::turned_reuleaux(random).shape->surfaces})
+      all.push_back(make_shape("rippled", test::with_decimals(surfaces, decimals)));
+  return all;
+}
+
+// Along a line round the axis: from one place on it, its slopes and the ripple's bend bound it in its patch,
+// the slopes and the seam beyond, and it is nowhere further off than twice the ripple.
+TEST(NearRevolution, a_line_round_the_axis_stays_within_its_ripple) {
+  Random random(5);
+  int near = 0, beyond = 0;
+  double tightest = 0;
+  for (const ShapePointer& shape : rippled_bodies(random)) {
+    EXPECT_FALSE(shape->revolution.found);
+    if (!shape->near_revolution.found()) continue;
+    ++near;
+    const Meridian& m = shape->near_revolution.meridian;
+    const Mat3 to_shape = m.axes.transpose();
+    const double size = shape->bounding_radius, noise = 64 * kRoundoff * size;
+    for (int k = 0; k < 400; ++k) {
+      const double angle = std::acos(random.uniform(-1, 1)), phi = random.uniform(-3.1, 3.1),
+                   turn = random.sign() * random.log_uniform(1e-3, 3);
+      const auto at = [&](double azimuth, RoundPoint* point) {
+        const Vec3 d(std::sin(angle) * std::cos(azimuth), std::sin(angle) * std::sin(azimuth),
+                     std::cos(angle));
+        return find_round_point(m, shape->patches, to_shape * d, size, {-1, 0, 0}, point);
+      };
+      RoundPoint p, q;
+      if (!at(phi, &p) || !at(phi + turn, &q)) continue;
+      // On a line of the profile the place may be any.
+      if (q.profile.place.piece != p.profile.place.piece ||
+          std::abs(q.profile.place.t - p.profile.place.t) > 1e-9)
+        continue;
+      const double off = std::hypot(q.r - p.r, q.z - p.z),
+                   bent = std::hypot(q.r - p.r - turn * p.slope_r, q.z - p.z - turn * p.slope_z),
+                   past = std::max({0.0, -turn - p.before, turn - p.after}),
+                   slope = std::hypot(p.slope_r, p.slope_z);
+      double allowed = 0.5 * p.ripple.bend * turn * turn;
+      if (past > 0) allowed += (p.ripple.slope + slope) * past + m.seam;
+      EXPECT_LE(off, 2 * p.ripple.most + noise);
+      EXPECT_LE(bent, allowed + noise);
+      EXPECT_LE(slope, p.ripple.slope + noise);
+      beyond += past > 0;
+      tightest = std::max(tightest, (bent - noise) / allowed);
+    }
+  }
+  EXPECT_GT(near, 16);
+  EXPECT_GT(beyond, 500);
+  EXPECT_GT(tightest, 0.1) << "no bound, only a large number";
+}
+
+// The balls that such a body holds along its meridian, against the support over its patches.
+TEST(NearRevolution, balls_along_the_meridian_are_bounds_of_the_support) {
+  Random random(6);
+  int balls = 0;
+  for (const ShapePointer& shape : rippled_bodies(random)) {
+    const NearRevolution& near = shape->near_revolution;
+    if (!near.found()) continue;
+    const double size = shape->bounding_radius;
+    const Vec3 axis = near.revolution.axis, across = axis.unitOrthogonal(), beside = axis.cross(across);
+    for (int k = 0; k < 200; ++k) {
+      const double angle = std::acos(random.uniform(-1, 1)), phi = random.uniform(-3.1, 3.1),
+                   reach = random.log_uniform(1e-4, 0.2);
+      const Vec3 out = std::cos(phi) * across + std::sin(phi) * beside;
+      const auto direction = [&](double a) { return Vec3(std::cos(a) * axis + std::sin(a) * out); };
+      RoundPoint on;
+      const double asked = std::clamp(angle + random.uniform(-reach, reach), 1e-9, M_PI - 1e-9);
+      if (!find_round_point(near.meridian, shape->patches, direction(asked), size,
+                            find_hull_support(*shape, direction(asked)).where, &on))
+        continue;
+      const ProfilePoint& profile = on.profile;
+      const double normal = std::atan2(profile.turn_r, profile.turn_z);
+      if (std::abs(normal - angle) > reach) continue;
+      const ProfileBall ball = ball_within(near, direction(angle), reach, profile.place, profile.place, size);
+      if (!(ball.radius > 0)) continue;
+      ++balls;
+      const Vec3 point = evaluate0(shape->patches[on.where.patch], on.where.u, on.where.v);
+      for (int j = 0; j < 4; ++j) {
+        const double a = angle + random.uniform(-reach, reach);
+        if (a < 0 || a > M_PI) continue;
+        const Vec3 d = direction(a);
+        const double h = find_hull_support(*shape, d).upper;
+        EXPECT_GE(h + 64 * kRoundoff * size,
+                  d.dot(point - ball.radius * direction(normal)) + ball.radius - ball.off);
+      }
+    }
+  }
+  EXPECT_GT(balls, 300);
 }
 
 // From one direction to another over a meridian the support rises at least as a ball of the least radius
