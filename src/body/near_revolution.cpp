@@ -38,6 +38,7 @@ NearRevolution find_near_revolution(const std::vector<BezierPatch>& patches, dou
   NearRevolution near;
   near.revolution = find_revolution(patches, size, kNearRevolution);
   near.meridian = make_meridian(patches, near.revolution, size, kNearRevolution);
+  if (near.meridian.empty()) return {};
   near.radii = make_profile_radii(near.meridian, patches, size, kNearKink);
   return near;
 }

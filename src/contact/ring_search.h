@@ -22,6 +22,12 @@ namespace nurbs {
 // (body/profile_radii.h). A ball is of revolution about any axis: K's is taken. Of a body with sharp edges
 // round an axis for part of a turn (body/round_edges.h) supports on them are circles for the azimuths that
 // they reach, and points beyond; its other supports are points.
+//
+// Where few digits keep K or M from being of revolution (body/near_revolution.h), a circle is the body's own
+// parameter line: its radius and height are those at the azimuth asked for, go on with their slopes there,
+// and lose what the ripple may bend, or, further off, all that it may be off by. What p rises and falls by
+// round the axis is then found by halving azimuths as before; balls along the meridian are the product's,
+// less what the ripple changes by along it.
 bool search_rings(const PairFrame& pair, double tolerance, bool last, PolytopeResult* result);
 
 }  // namespace nurbs

@@ -200,6 +200,15 @@ TEST(NearRevolution, a_line_round_the_axis_stays_within_its_ripple) {
   EXPECT_GT(tightest, 0.1) << "no bound, only a large number";
 }
 
+// About an axis, but with a patch that is no product of a profile and an arc: nothing is known of it.
+TEST(NearRevolution, is_whole_or_none) {
+  for (const ShapePointer& shape : test::all_shapes()) {
+    const NearRevolution& near = shape->near_revolution;
+    EXPECT_EQ(near.found(), near.revolution.found) << shape->name;
+    EXPECT_FALSE(near.found() && shape->revolution.found) << shape->name;
+  }
+}
+
 // The balls that such a body holds along its meridian, against the support over its patches.
 TEST(NearRevolution, balls_along_the_meridian_are_bounds_of_the_support) {
   Random random(6);
