@@ -390,10 +390,14 @@ Ripple ripple_at(const Meridian::Piece& piece, double t) {
   return r;
 }
 
-// Of a point on a patch that a piece sweeps.
+// Of a point on a patch that a piece sweeps; and back, `u` the arc's parameter.
 Meridian::Place place_on(const Meridian& m, const Meridian::Sector& sector, const SurfacePoint& at) {
   const double t = sector.arcs_in_u ? at.v : at.u;
   return {piece_swept(m, sector), sector.backwards ? 1 - t : t};
+}
+SurfacePoint point_on(const Meridian::Sector& sector, double u, const Meridian::Place& place) {
+  const double t = sector.backwards ? 1 - place.t : place.t;
+  return {sector.patch, sector.arcs_in_u ? u : t, sector.arcs_in_u ? t : u};
 }
 
 // The arc's parameter where it points along (x, y), of angle `angle`; false where Newton is not sure.
@@ -417,6 +421,19 @@ bool parameter_of(const Meridian::Sector& s, double x, double y, double angle, d
     }
   }
   return false;
+}
+
+// The sector of a piece that has a place along (x, y), and the arc's parameter there; `first` is looked at
+// first, if it is one. Null where none is sure.
+const Meridian::Sector* sector_along(const Meridian& m, const Meridian::Piece& piece,
+                                     const Meridian::Sector* first, double x, double y, double angle,
+                                     double* u) {
+  if (first && parameter_of(*first, x, y, angle, u)) return first;
+  for (int k = 0; k < piece.sectors; ++k) {
+    const Meridian::Sector& sector = m.sectors[piece.first_sector + k];
+    if (&sector != first && parameter_of(sector, x, y, angle, u)) return &sector;
+  }
+  return nullptr;
 }
 
 }  // namespace
@@ -543,8 +560,7 @@ bool find_meridian_support(const Meridian& m, const Vec3& d, double size, const 
   const Meridian::Piece& piece = m.pieces[best.piece];
 
   const auto put = [&](const Meridian::Sector& sector, double u) {
-    const double t = sector.backwards ? 1 - best.t : best.t;
-    found->where = {sector.patch, sector.arcs_in_u ? u : t, sector.arcs_in_u ? t : u};
+    found->where = point_on(sector, u, best);
     found->upper = search.height() + d.dot(m.point) + search.slack() + m.error;
     return true;
   };
@@ -554,12 +570,8 @@ bool find_meridian_support(const Meridian& m, const Vec3& d, double size, const 
   }
   const double x = e[0] / dr, y = e[1] / dr, angle = std::atan2(y, x);
   double u;
-  if (stays && parameter_of(*last, x, y, angle, &u)) return put(*last, u);
-  for (int k = 0; k < piece.sectors; ++k) {
-    const Meridian::Sector& sector = m.sectors[piece.first_sector + k];
-    if (&sector != last && parameter_of(sector, x, y, angle, &u)) return put(sector, u);
-  }
-  return false;
+  const Meridian::Sector* there = sector_along(m, piece, stays ? last : nullptr, x, y, angle, &u);
+  return there && put(*there, u);
 }
 
 bool find_round_point(const Meridian& m, const std::vector<BezierPatch>& patches, const Vec3& d, double size,
@@ -577,31 +589,28 @@ bool find_round_point(const Meridian& m, const std::vector<BezierPatch>& patches
   }
   const Meridian::Piece& piece = m.pieces[best.piece];
   const double x = e[0] / dr, y = e[1] / dr, angle = std::atan2(y, x);
-  for (int k = 0; k < piece.sectors; ++k) {
-    const Meridian::Sector& sector = m.sectors[piece.first_sector + k];
-    double u;
-    if (!parameter_of(sector, x, y, angle, &u)) continue;
-    const double t = sector.backwards ? 1 - best.t : best.t;
-    found->where = {sector.patch, sector.arcs_in_u ? u : t, sector.arcs_in_u ? t : u};
-    const Jet1 jet = evaluate1(patches[sector.patch], found->where.u, found->where.v);
-    const Jet ax = evaluate(sector.x, sector.degree, u), ay = evaluate(sector.y, sector.degree, u);
-    const double turn = (ax.f * ay.f1 - ay.f * ax.f1) / (ax.f * ax.f + ay.f * ay.f);  // of the arc, by u
-    const Vec3 at = m.axes * (jet.s - m.point), by_u = m.axes * (sector.arcs_in_u ? jet.su : jet.sv);
-    found->r = x * at[0] + y * at[1];
-    found->z = at[2];
-    found->slope_r = x * at[1] - y * at[0] + (x * by_u[0] + y * by_u[1]) / turn;
-    found->slope_z = by_u[2] / turn;
-    found->profile = profile_point(m, best, dr / std::hypot(dr, e[2]), e[2] / std::hypot(dr, e[2]), size);
-    const double from_begin = wrap(angle - sector.begin) * (sector.sweep < 0 ? -1 : 1),
-                 passed = std::clamp(from_begin < -kMeridianOver ? from_begin + kTurn : from_begin, 0.0,
-                                     std::abs(sector.sweep)),
-                 left = std::abs(sector.sweep) - passed;
-    found->ripple = ripple_at(piece, best.t);
-    found->before = sector.sweep < 0 ? left : passed;
-    found->after = sector.sweep < 0 ? passed : left;
-    return true;
-  }
-  return false;
+  double u;
+  const Meridian::Sector* there = sector_along(m, piece, nullptr, x, y, angle, &u);
+  if (!there) return false;
+  const Meridian::Sector& sector = *there;
+  found->where = point_on(sector, u, best);
+  found->profile = profile_point(m, best, dr, e[2], size);
+  found->ripple = ripple_at(piece, best.t);
+  const Jet1 jet = evaluate1(patches[sector.patch], found->where.u, found->where.v);
+  const Jet ax = evaluate(sector.x, sector.degree, u), ay = evaluate(sector.y, sector.degree, u);
+  const double turn = (ax.f * ay.f1 - ay.f * ax.f1) / (ax.f * ax.f + ay.f * ay.f);  // of the arc, by u
+  const Vec3 at = m.axes * (jet.s - m.point), by_u = m.axes * (sector.arcs_in_u ? jet.su : jet.sv);
+  found->r = x * at[0] + y * at[1];
+  found->z = at[2];
+  found->slope_r = x * at[1] - y * at[0] + (x * by_u[0] + y * by_u[1]) / turn;
+  found->slope_z = by_u[2] / turn;
+  const double from_begin = wrap(angle - sector.begin) * (sector.sweep < 0 ? -1 : 1),
+               passed = std::clamp(from_begin < -kMeridianOver ? from_begin + kTurn : from_begin, 0.0,
+                                   std::abs(sector.sweep)),
+               left = std::abs(sector.sweep) - passed;
+  found->before = sector.sweep < 0 ? left : passed;
+  found->after = sector.sweep < 0 ? passed : left;
+  return true;
 }
 
 }  // namespace nurbs

@@ -16,16 +16,11 @@ using Row = std::vector<Real>;
 Row times(const Row& a, const Row& b) {
   return multiply(a, b, [](Real x, Real y) { return x * y; });
 }
-Row combine(const Row& a, Real factor, const Row& b) {
-  Row sum(a);
-  for (size_t k = 0; k < sum.size(); ++k) sum[k] += factor * b[k];
+Row square_of(const UnitArc& arc) {  // x^2 + y^2
+  Row sum = times(arc.x, arc.x);
+  const Row y2 = times(arc.y, arc.y);
+  for (size_t k = 0; k < sum.size(); ++k) sum[k] += y2[k];
   return sum;
-}
-Row derivative(const Row& a) {
-  const auto n = static_cast<Real>(a.size() - 1);
-  Row d;
-  for (size_t k = 0; k + 1 < a.size(); ++k) d.push_back(n * (a[k + 1] - a[k]));
-  return d;
 }
 Real least(const Row& a) {
   return *std::min_element(a.begin(), a.end());
@@ -54,10 +49,8 @@ Most operator*(const Most& a, const Most& b) {
 }
 
 Most most_of(const Row& a) {
-  Most m{largest(a)};
-  if (a.size() > 1) m.f1 = largest(derivative(a));
-  if (a.size() > 2) m.f2 = largest(derivative(derivative(a)));
-  return m;
+  const Row first = derivative(a);
+  return {largest(a), largest(first), largest(derivative(first))};
 }
 // Of 1 / f, f no less than `least` > 0.
 Most inverse(const Most& f, Real least) {
@@ -76,15 +69,13 @@ struct ByAzimuth {
 };
 
 // phi = atan2(y, x), phi' = (x y' - y x') / (x^2 + y^2).
-bool by_azimuth(const UnitArc& arc, ByAzimuth* by) {
-  const Row dx = derivative(arc.x), dy = derivative(arc.y);
-  Row turn = combine(times(arc.x, dy), -1, times(arc.y, dx));
-  const Row square = combine(times(arc.x, arc.x), 1, times(arc.y, arc.y));
+bool by_azimuth(const UnitArc& arc, const Row& square, ByAzimuth* by) {
+  Row turn = difference(times(arc.x, derivative(arc.y)), times(arc.y, derivative(arc.x)));
   if (turn[0] < 0)
     for (Real& t : turn) t = -t;
   if (!(least(turn) > 0 && least(square) > 0)) return false;
   by->first = largest(square) / least(turn);
-  const Row bend = combine(times(derivative(turn), square), -1, times(turn, derivative(square)));
+  const Row bend = difference(times(derivative(turn), square), times(turn, derivative(square)));
   by->second = largest(bend) / (least(square) * least(square)) * by->first * by->first * by->first;
   return true;
 }
@@ -118,7 +109,8 @@ Most along_arc(const ArcNet& net, int j, const Value& value) {
 std::vector<Ripple> ripple_of(const ArcNet& net, const ArcNet& product, const UnitArc& arc, double speed) {
   constexpr double kSlack = 1.01;  // of the product's circles, which are nearly that
   ByAzimuth by;
-  if (net.arc < 2 || !by_azimuth(arc, &by)) return {};
+  const Row square = square_of(arc), w2 = times(arc.w, arc.w);
+  if (net.arc < 2 || !by_azimuth(arc, square, &by)) return {};
   using Vector = Eigen::Matrix<Real, 3, 1>;
   using Number = Eigen::Matrix<Real, 1, 1>;
   Real least_weight = net.at(0, 0)[3], furthest = 0;
@@ -140,9 +132,8 @@ std::vector<Ripple> ripple_of(const ArcNet& net, const ArcNet& product, const Un
   const Most over = inverse(w, least_weight);
   const Real round = kSlack * furthest;
   // The arc's own radius is the root of 1 + g.
-  const Row square = combine(times(arc.x, arc.x), 1, times(arc.y, arc.y)), w2 = times(arc.w, arc.w);
   if (!(least(w2) > 0)) return {};
-  const Most g = by.of(most_of(combine(square, -1, w2)) * inverse(most_of(w2), least(w2)));
+  const Most g = by.of(most_of(difference(square, w2)) * inverse(most_of(w2), least(w2)));
   if (!(g.f < 0.01)) return {};
   const Most radius{0.51L * g.f, 0.51L * g.f1, 0.51L * g.f2 + 0.26L * g.f1 * g.f1};
   Real most_top = 0, most_off = 0;

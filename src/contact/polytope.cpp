@@ -867,7 +867,7 @@ class Search {
 // Along an axis of revolution, where a ring of directions is hardly one.
 bool is_polar(const PairFrame& pair, const Vec3& d) {
   const auto along = [&](const Shape& shape, const Mat3& turn) {
-    const Revolution& about = shape.revolution.found ? shape.revolution : shape.near_revolution.revolution;
+    const Revolution& about = revolution_of(shape);
     return about.found && !shape.proofs.sphere && d.cross(turn * about.axis).squaredNorm() < kPolar * kPolar;
   };
   return along(*pair.a, Mat3::Identity()) || along(*pair.b, pair.turn);
@@ -885,7 +885,7 @@ __attribute__((noinline)) void make_points_face(const PairFrame& pair, double to
 }
 
 bool has_rings(const Shape& shape) {
-  return shape.revolution.found || shape.near_revolution.found() || !shape.round_edges.empty();
+  return revolution_of(shape).found || !shape.round_edges.empty();
 }
 
 // What two attempts know together: the narrower one's points, along the direction of the higher lower end.

@@ -43,14 +43,6 @@ constexpr double kOffRipple = 3;      // times the most it is off by, a circle i
 constexpr double kRippleShare = 0.2;  // of the tolerance, up to which rippled circles are followed anyway
 constexpr double kLeastSine = 0.02;   // up to which lengths are taken off radii instead
 
-// About which a body is one, if only nearly.
-const Revolution& revolution_of(const Shape& shape) {
-  return shape.revolution.found ? shape.revolution : shape.near_revolution.revolution;
-}
-bool revolves(const Shape& shape) {
-  return shape.revolution.found || shape.near_revolution.found();
-}
-
 // One body of revolution K and its mate M: axes and lengths of the pair frame, e = sign d.
 struct View {
   const Shape *k, *m;
@@ -153,6 +145,10 @@ struct Wave {
   double phi = 0, k_r = 0, k_z = 0, m_r = 0, m_z = 0, before = -1, after = -1;
   Ripple ripple;  // of both bodies' lines
   double steep() const { return std::hypot(k_r, k_z) + std::hypot(m_r, m_z); }
+  void reach(double low, double high) {
+    before = std::min(before, low);
+    after = std::min(after, high);
+  }
 };
 
 // What projections need of it, apart: they go through all.
@@ -274,29 +270,32 @@ class RingSearch {
                                         enough / view_.scale_m, kHullSlope);
     ++queries_;
     Circle c;
-    Vec3 x = view_.turn_k * (view_.scale_k * k.point - view_.ball_k * k.normal),
-         xm = view_.turn_m * mate_core(m, view_.turn_m.transpose() * -e);
-    c.nk = view_.turn_k * k.normal;
-    c.nm = view_.turn_m * -m.normal;
-    c.r = c.rm = kFarAway;  // unless known with their signs
-    const Wave wave = wave_along(e, k.where, m.where, &c, &x, &xm);
+    const Line line_k = view_.near_k ? line_of(*view_.k, view_.scale_k, view_.turn_k, e, k.where) : Line{},
+               line_m = view_.near_m ? line_of(*view_.m, view_.scale_m, view_.turn_m, -e, m.where) : Line{};
+    const Vec3 x = line_k.known ? line_k.at
+                                : view_.turn_k * (view_.scale_k * k.point - view_.ball_k * k.normal),
+               xm = line_m.known ? line_m.at : view_.turn_m * mate_core(m, view_.turn_m.transpose() * -e);
+    c.nk = line_k.known ? line_k.normal : view_.turn_k * k.normal;
+    c.nm = -(line_m.known ? line_m.normal : view_.turn_m * m.normal);
+    c.place_k = line_k.on.profile.place;
+    c.place_m = line_m.on.profile.place;
     c.on_k = x - view_.point;
     c.z = view_.axis.dot(c.on_k);
-    if (!(c.r < kFarAway)) c.r = view_.across(c.on_k).norm();
+    c.r = line_k.known ? view_.scale_k * line_k.on.r : view_.across(c.on_k).norm();
     c.lone = view_.arcs && !on_arcs(c);
     c.at = {view_.axis.dot(e), view_.across(e).norm()};
     c.middle = xm;
-    if (!view_.circles) {
-      c.rm = 0;
-    } else {
+    c.rm = 0;
+    if (view_.circles) {
       const Vec3 from = xm - view_.mate_point;
       c.middle = view_.mate_point + view_.mate_axis.dot(from) * view_.mate_axis;
-      if (!(c.rm < kFarAway)) c.rm = (xm - c.middle).norm();
+      c.rm = line_m.known ? view_.scale_m * line_m.on.r : (xm - c.middle).norm();
     }
     c.k = view_.offset - view_.point + c.middle;
     const double around = c.at.s > 0 ? 1 / c.at.s : 0;
     const Angle u{around * tangent_.dot(e), around * second_.dot(e)};
-    flat_[count_] = {c.at, u, c.rm, c.lone, flat(c.r, c.z, c.k), flat(0, 0, c.k - c.on_k), wave};
+    flat_[count_] = {
+        c.at, u, c.rm, c.lone, flat(c.r, c.z, c.k), flat(0, 0, c.k - c.on_k), wave(e, line_k, line_m)};
     insert(c);
     const double p = view_.scale_k * k.upper + view_.scale_m * m.upper - balls() - e.dot(view_.offset);
     last_ = p;
@@ -311,42 +310,48 @@ class RingSearch {
     return true;
   }
 
-  // Of rippled bodies points on parameter lines round the axis take the supports' places.
-  Wave wave_along(const Vec3& e, const SurfacePoint& on_k, const SurfacePoint& on_m, Circle* c, Vec3* x,
-                  Vec3* xm) const {
+  // Of a rippled body, a parameter line round its axis that takes a support's place; pair frame.
+  struct Line {
+    bool known = false;
+    Vec3 at, normal;  // in the half plane: how far a point is off that says nothing of its distance
+    RoundPoint on;    // the body's own, scale 1
+  };
+  static Line line_of(const Shape& shape, double scale, const Mat3& turn, const Vec3& d,
+                      const SurfacePoint& support) {
+    const NearRevolution& near = shape.near_revolution;
+    const Vec3 own = turn.transpose() * d, axis = near.revolution.axis;
+    Line line{};
+    line.known =
+        find_round_point(near.meridian, shape.patches, own, shape.bounding_radius, support, &line.on);
+    if (!line.known) return line;
+    const RoundPoint& on = line.on;
+    const Vec3 across = (own - axis.dot(own) * axis).normalized();
+    line.at = scale * (turn * (near.meridian.point + on.r * across + on.z * axis));
+    line.normal = turn * (on.profile.turn_r * across + on.profile.turn_z * axis);
+    return line;
+  }
+  Wave wave(const Vec3& e, const Line& k, const Line& m) const {
     Wave wave;
     if (!view_.rippled()) return wave;
     wave.phi = azimuth(e);
+    if ((view_.near_k && !k.known) || (view_.near_m && !m.known)) {
+      wave.ripple = view_.ripple;
+      return wave;
+    }
     wave.before = wave.after = M_PI;
-    const auto take = [&](const Shape& shape, double scale, const Mat3& turn, const SurfacePoint& support,
-                          double sign, double turns, Vec3* at, Vec3* normal, Meridian::Place* place,
-                          double* r, double* slope_r, double* slope_z) {
-      const NearRevolution& near = shape.near_revolution;
-      const Vec3 own = turn.transpose() * (sign * e);
-      RoundPoint on;
-      if (!find_round_point(near.meridian, shape.patches, own, shape.bounding_radius, support, &on)) {
-        wave.before = wave.after = -1;
-        return;
-      }
-      const Vec3 axis = near.revolution.axis, across = (own - axis.dot(own) * axis).normalized();
-      // In the half plane: how far it is off that says nothing of the distance from the axis.
-      *at = scale * (turn * (near.meridian.point + on.r * across + on.z * axis));
-      *r = scale * on.r;
-      *normal = sign * (turn * (on.profile.turn_r * across + on.profile.turn_z * axis));
-      *place = on.profile.place;
-      *slope_r = turns * scale * on.slope_r;
-      *slope_z = scale * on.slope_z;
-      wave.ripple.add(scale, on.ripple);
-      wave.before = std::min(wave.before, turns > 0 ? on.before : on.after);
-      wave.after = std::min(wave.after, turns > 0 ? on.after : on.before);
-    };
-    if (view_.near_k)
-      take(*view_.k, view_.scale_k, view_.turn_k, on_k, 1, 1, x, &c->nk, &c->place_k, &c->r, &wave.k_r,
-           &wave.k_z);
-    if (view_.near_m)
-      take(*view_.m, view_.scale_m, view_.turn_m, on_m, -1, view_.turn_m_sign, xm, &c->nm, &c->place_m,
-           &c->rm, &wave.m_r, &wave.m_z);
-    if (wave.before < 0) wave.ripple = view_.ripple;
+    if (k.known) {
+      wave.k_r = view_.scale_k * k.on.slope_r;
+      wave.k_z = view_.scale_k * k.on.slope_z;
+      wave.reach(k.on.before, k.on.after);
+      wave.ripple.add(view_.scale_k, k.on.ripple);
+    }
+    if (m.known) {
+      const bool against = view_.turn_m_sign < 0;
+      wave.m_r = view_.turn_m_sign * view_.scale_m * m.on.slope_r;
+      wave.m_z = view_.scale_m * m.on.slope_z;
+      wave.reach(against ? m.on.after : m.on.before, against ? m.on.before : m.on.after);
+      wave.ripple.add(view_.scale_m, m.on.ripple);
+    }
     return wave;
   }
 
@@ -370,6 +375,11 @@ class RingSearch {
     return view_.scale_m * view_.swept->points[view_.swept->support(own)] + left * own;
   }
 
+  // To a sector's middle from where a circle was asked for, rad.
+  static double turn_to(const Sector& sector, const Wave& w) {
+    return std::remainder(sector.phi - w.phi, 2 * M_PI);
+  }
+
   // The order of circles is that of the angles they were asked for. Chosen are those asked for in a sector,
   // and some on either side, of a mate's points some that were asked for at azimuths near the sector's.
   void choose(const Sector& sector, double half) {
@@ -381,7 +391,7 @@ class RingSearch {
     const Angle& u = sector.u;
     const auto near = [&](const FlatCircle& c) {
       if (view_.rippled()) {
-        const double beyond = std::abs(std::remainder(sector.phi - c.wave.phi, 2 * M_PI)) - 2 * half;
+        const double beyond = std::abs(turn_to(sector, c.wave)) - 2 * half;
         return !(beyond > 0) || c.wave.ripple.bend * beyond * beyond <= 2 * kRippleShare * tolerance_;
       }
       return (view_.circles && !c.lone) || reach > 1 || c.at.s == 0 ||
@@ -452,7 +462,7 @@ class RingSearch {
   };
   Drift drift(const Wave& w, const Angle& at, const Sector& sector, double half, const Reach& over) const {
     if (!view_.rippled()) return {};
-    Drift d{false, std::remainder(sector.phi - w.phi, 2 * M_PI), kOffRipple * w.ripple.most};
+    Drift d{false, turn_to(sector, w), kOffRipple * w.ripple.most};
     double furthest = std::abs(d.turn) + half, tilted = 0;
     if (view_.near_m && view_.tilt > 0) {
       if (!(over.across > 0)) return d;
@@ -582,11 +592,15 @@ class RingSearch {
     return std::max(radius, least_bend(shape, e, (axis - cosine * e) / sine, reach, false));
   }
 
-  // A ball's radius, if it leaves enough of the tolerance.
-  double worth(const ProfileBall& ball, double scale, double* off) const {
+  // The same of a rippled one that two lines are known of, less `off`, if that leaves enough of the
+  // tolerance.
+  double rippled_bend(const Shape& shape, double scale, const Vec3& e, double reach,
+                      const Meridian::Place& one, const Meridian::Place& two, double* off) const {
+    const ProfileBall ball =
+        ball_within(shape.near_revolution, e, kChord * reach, one, two, shape.bounding_radius);
     if (!(scale * ball.off <= kRippleShare * tolerance_)) return 0;
     *off += scale * ball.off;
-    return scale * ball.radius;
+    return ball.radius;
   }
 
   // Balls that touch two circles from inside, wherever they and the sector's directions lie on the meridians:
@@ -606,34 +620,28 @@ class RingSearch {
     for (const Circle* c : {one, two}) asked = std::max(asked, apart(view_.axis, c->nk, e));
     const Mat3 to_k = view_.turn_k.transpose(), to_m = view_.turn_m.transpose();
     double of_k = 0;
-    if (view_.near_k) {
-      const ProfileBall ball =
-          ball_within(view_.k->near_revolution, to_k * e, kChord * std::max(range, asked), one->place_k,
-                      two->place_k, view_.k->bounding_radius);
-      of_k = worth(ball, view_.scale_k, off);
-    } else if (!view_.arcs)
-      of_k =
-          view_.scale_k * meridian_bend(*view_.k, to_k * e, view_.k->revolution.axis, std::max(range, asked));
+    const double reach_k = std::max(range, asked);
+    if (view_.near_k)
+      of_k = view_.scale_k *
+             rippled_bend(*view_.k, view_.scale_k, to_k * e, reach_k, one->place_k, two->place_k, off);
+    else if (!view_.arcs)
+      of_k = view_.scale_k * meridian_bend(*view_.k, to_k * e, view_.k->revolution.axis, reach_k);
     of_k = std::max(0.0, of_k - view_.ball_k);
     for (Circle* c : {one, two}) {
       c->r -= of_k * view_.across(c->nk).norm();
       c->z -= of_k * c->nk.dot(view_.axis);
     }
-    double of_m = 0;
+    double of_m;
     asked = 0;
     if (view_.circles) {
       const Vec3& axis = view_.mate_axis;
       for (const Circle* c : {one, two}) asked = std::max(asked, apart(axis, c->nm, e));
       range += view_.tilt * sector.half / over.across;
-      if (view_.near_m) {
-        const ProfileBall ball =
-            ball_within(view_.m->near_revolution, to_m * -e, kChord * std::max(range, asked), one->place_m,
-                        two->place_m, view_.m->bounding_radius);
-        of_m = worth(ball, view_.scale_m, off);
-      } else {
-        const Vec3 own = view_.m->proofs.sphere ? Vec3(to_m * axis) : view_.m->revolution.axis;
-        of_m = view_.scale_m * meridian_bend(*view_.m, to_m * -e, own, std::max(range, asked));
-      }
+      const double reach_m = std::max(range, asked);
+      const Vec3 own = view_.m->proofs.sphere ? Vec3(to_m * axis) : view_.m->revolution.axis;
+      of_m = view_.scale_m * (view_.near_m ? rippled_bend(*view_.m, view_.scale_m, to_m * -e, reach_m,
+                                                          one->place_m, two->place_m, off)
+                                           : meridian_bend(*view_.m, to_m * -e, own, reach_m));
       of_m = std::max(0.0, of_m - view_.ball);
       for (const Circle* c : {one, two}) of_m = std::min(of_m, c->rm / c->nm.cross(axis).norm());
       for (Circle* c : {one, two}) {
@@ -694,20 +702,19 @@ class RingSearch {
       const Drift drift = this->drift(w, circle.at, sector, sector.half, over);
       rippled = std::max(rippled, drift.lost);
       *wave_slope = 0;
-      if (!drift.followed) return circle;
-      steep = std::max(steep, w.steep());
-      *wave_slope = s * w.k_r + c * w.k_z + m.sine * w.m_r - w.m_z * (s * b[0] + c * b[2]);
-      follow(w, drift.turn, &circle);
-      return circle;
-    };
-    const auto within_axis = [&](Circle circle) {  // circles of M that go beyond it are points
-      rippled = std::max(rippled, rippled - circle.rm);
-      circle.rm = std::max(0.0, circle.rm);
+      if (drift.followed) {
+        steep = std::max(steep, w.steep());
+        *wave_slope = s * w.k_r + c * w.k_z + m.sine * w.m_r - w.m_z * (s * b[0] + c * b[2]);
+        follow(w, drift.turn, &circle);
+      }
+      if (circle.rm < 0) {  // beyond M's axis
+        rippled -= circle.rm;
+        circle.rm = 0;
+      }
       return circle;
     };
     double wave_x, wave_y;
-    Circle one = within_axis(at_sector(which_[here.from], &wave_x)),
-           two = within_axis(at_sector(which_[here.to], &wave_y));
+    Circle one = at_sector(which_[here.from], &wave_x), two = at_sector(which_[here.to], &wave_y);
     double off = 0;
     const double round = round_off(sector, here.at, u, over, &one, &two, &off) - rippled - off;
     Slope x = slope(one), y = slope(two);
@@ -749,15 +756,13 @@ class RingSearch {
     if (!view_.rippled()) return false;
     return std::any_of(which_, which_ + chosen_, [&](int k) {
       return std::abs(cross(flat_[k].at, at)) <= kSameAngle &&
-             std::abs(std::remainder(sector.phi - flat_[k].wave.phi, 2 * M_PI)) <= kSameAngle;
+             std::abs(turn_to(sector, flat_[k].wave)) <= kSameAngle;
     });
   }
 
   // Rippled circles tell of azimuths near theirs, and those of sectors that are closed are done with.
   void forget_far_from(const Sector& sector) {
-    const auto off = [&](const FlatCircle& c) {
-      return std::abs(std::remainder(sector.phi - c.wave.phi, 2 * M_PI));
-    };
+    const auto off = [&](const FlatCircle& c) { return std::abs(turn_to(sector, c.wave)); };
     double offs[kMostCircles];
     for (int k = 0; k < count_; ++k) offs[k] = off(flat_[k]);
     std::nth_element(offs, offs + kMostCircles / 2, offs + count_);
@@ -807,7 +812,7 @@ class RingSearch {
       sector.low = wide.low;
       sector.high = wide.high;
       const Least here = bound(sector, 0, threshold);
-      bool narrower = false;
+      bool narrower;
       const double second = second_order(sector, here, &narrower);
       if (second >= threshold) {
         proven_ = std::min(proven_, second);
@@ -909,7 +914,7 @@ bool search_about(const PairFrame& pair, bool k_is_a, const RoundEdges* arcs, do
   const Vec3 of_k = arcs ? arcs->axis : revolution_of(k).axis, of_mate = revolution_of(mate).axis,
              axis = k_is_a ? Vec3(pair.turn * of_mate) : of_mate,
              own = k_is_a ? of_k : Vec3(pair.turn * of_k);
-  const bool near = revolves(mate) && own.cross(axis).norm() < kNearAxis;
+  const bool near = revolution_of(mate).found && own.cross(axis).norm() < kNearAxis;
   for (const bool core : {false, true})
     if ((core ? round : near || !round) &&
         RingSearch(pair, k_is_a, core, tolerance, arcs).run(last, left, result))
@@ -919,11 +924,15 @@ bool search_about(const PairFrame& pair, bool k_is_a, const RoundEdges* arcs, do
 
 }  // namespace
 
+const Revolution& revolution_of(const Shape& shape) {
+  return shape.revolution.found ? shape.revolution : shape.near_revolution.revolution;
+}
+
 bool search_rings(const PairFrame& pair, double tolerance, bool last, PolytopeResult* result) {
   double left = kAllRings;
   for (const bool k_is_a : {true, false}) {
     const Shape& k = k_is_a ? *pair.a : *pair.b;
-    if (revolves(k) && !k.proofs.sphere &&
+    if (revolution_of(k).found && !k.proofs.sphere &&
         search_about(pair, k_is_a, nullptr, tolerance, last, &left, result))
       return true;
     for (const RoundEdges& arcs : k.round_edges)

@@ -10,7 +10,7 @@ namespace nurbs {
 
 namespace {
 
-constexpr double kMostStoodIn = 4096;  // that a body stands in
+constexpr double kMostStoodIn = 4096;  // cells that a body is entered in
 constexpr double kTolerance = 1e-6;  // of the gap, over the smaller bounding radius: closer counts as overlap
 
 double reach_of(const Particle& body) {
@@ -90,14 +90,13 @@ bool InsertionSite::meets(const Particle& a, const Particle& b, Overlap judge) c
 }
 
 bool InsertionSite::overlaps(const Particle& body, Overlap judge) const {
-  const auto in_the_way = [&](int number) { return meets(bodies_[number], body, judge); };
-  if (std::any_of(large_.begin(), large_.end(), in_the_way)) return true;
   const Cells cells = cells_of(body);
-  if (many(cells)) {
-    for (int number = 0; number < count(); ++number)
-      if (in_the_way(number)) return true;
-    return false;
-  }
+  if (many(cells))
+    return std::any_of(bodies_.begin(), bodies_.end(),
+                       [&](const Particle& other) { return meets(other, body, judge); });
+  if (std::any_of(large_.begin(), large_.end(),
+                  [&](int number) { return meets(bodies_[number], body, judge); }))
+    return true;
   ++question_;
   bool found = false;
   for_each_cell(cells, [&](std::uint64_t cell) {
