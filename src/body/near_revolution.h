@@ -9,6 +9,8 @@
 
 namespace nurbs {
 
+struct Shape;
+
 struct NearRevolution {
   Revolution revolution;  // of the body that it nearly is; `error`: between that and itself
   Meridian meridian;      // of that, with the ripple
@@ -25,6 +27,9 @@ void archive(Archive& a, NearRevolution& s) {
 // Of a body whose joints meet and that is none of revolution itself; off that by no more than kNearRevolution
 // of its size.
 NearRevolution find_near_revolution(const std::vector<BezierPatch>& patches, double size);
+
+// What a shape is turned about, exactly or but for few digits; `found` is false of others.
+const Revolution& revolution_of(const Shape& shape);
 
 // How the body bends along its meridian about a direction `own`, unit, shape frame: with places of the
 // profile and their points P and normals n (RoundPoint), for every direction d in the half plane of the

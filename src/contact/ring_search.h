@@ -30,7 +30,4 @@ namespace nurbs {
 // less what the ripple changes by along it.
 bool search_rings(const PairFrame& pair, double tolerance, bool last, PolytopeResult* result);
 
-// That a body is one of, exactly or but for few digits; `found` is false of others.
-const Revolution& revolution_of(const Shape& shape);
-
 }  // namespace nurbs
