@@ -14,10 +14,10 @@
 #include "bench/machine.h"
 #include "bench/staged_pairs.h"
 #include "body/support.h"
-#include "contact/cylinder_search.h"
 #include "contact/direction_search.h"
 #include "contact/pair_memory.h"
 #include "contact/pair_search.h"
+#include "contact/walls/cylinder_search.h"
 #include "motion/rotor.h"
 #include "nurbs/bezier_patch.h"
 

@@ -1,6 +1,6 @@
 // The inner map: over directions, balls that lie inside a body as far as those directions can tell. With two
 // of them, one a body, whole ranges of directions are known to overlap by more than some depth without a
-// support evaluated (contact/deep_search.h).
+// support evaluated (contact/overlap/deep_search.h).
 #pragma once
 
 #include <array>

@@ -1,5 +1,5 @@
 // Bodies that files of few digits keep from being ones of revolution: about the axis they are rippled. Deep
-// contacts make rings of directions alike about it but for that (contact/ring_search.h).
+// contacts make rings of directions alike about it but for that (contact/overlap/ring_search.h).
 #pragma once
 
 #include <vector>

@@ -1,5 +1,5 @@
 // How strongly a meridian bends, by the angle of its normal from the axis: what rings of directions about the
-// axis (contact/ring_search.h) know of a body of revolution between two of its circles.
+// axis (contact/overlap/ring_search.h) know of a body of revolution between two of its circles.
 #pragma once
 
 #include <vector>

@@ -1,6 +1,6 @@
 // Sharp edges that run round an axis, of bodies that need not: of sphericons, oblique cones, wedges with a
 // round face, prisms over arcs. Deep contacts make rings of directions alike about them
-// (contact/ring_search.h).
+// (contact/overlap/ring_search.h).
 #pragma once
 
 #include <cmath>

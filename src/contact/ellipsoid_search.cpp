@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "contact/ellipsoid_overlap.h"
+#include "contact/overlap/ellipsoid_overlap.h"
 
 namespace nurbs {
 namespace {

@@ -9,8 +9,8 @@
 #include <functional>
 #include <utility>
 
-#include "contact/contact_polygon.h"
 #include "contact/pair_memory.h"
+#include "contact/polygons/contact_polygon.h"
 #include "laws/contact_model.h"
 #include "scene/bodies.h"
 

@@ -16,7 +16,7 @@
 #include <vector>
 
 #include "contact/effective_radius.h"
-#include "contact/surface_search.h"
+#include "contact/walls/surface_search.h"
 #include "laws/energy_ledger.h"
 #include "scene/contact_pool.h"
 
@@ -61,7 +61,7 @@ struct ContactView {
   EnergyLedger stored;  // in its springs; negative, as the forces are, where it takes others off
 };
 
-// A contact of a body with a wall of many faces, found by the caller (contact/surface_search.h).
+// A contact of a body with a wall of many faces, found by the caller (contact/walls/surface_search.h).
 struct WallContact {
   ContactResult result;  // points in lab axes from the lab's origin; A is the wall
   double weight = 1;     // +1, or below 0: what other contacts count twice

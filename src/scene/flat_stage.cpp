@@ -1,5 +1,6 @@
 // The contacts of pairs whose flat faces, creases or ruled lines meet: several points with frozen weights, as
-// contact/contact_polygon.h describes their life. A pair has either its one contact or those of a polygon.
+// contact/polygons/contact_polygon.h describes their life. A pair has either its one contact or those of a
+// polygon.
 #include <algorithm>
 #include <cmath>
 

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <cstring>
 
-#include "contact/cylinder_search.h"
+#include "contact/walls/cylinder_search.h"
 
 namespace nurbs {
 namespace {

@@ -7,7 +7,7 @@
 #include <memory>
 #include <vector>
 
-#include "contact/tube_search.h"
+#include "contact/walls/tube_search.h"
 #include "scene/contact_stages.h"
 
 namespace nurbs {

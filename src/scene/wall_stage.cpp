@@ -1,5 +1,5 @@
-// Contacts with walls of many faces: the caller finds them anew every step (contact/surface_search.h); here
-// they get their history and go through the law with all others.
+// Contacts with walls of many faces: the caller finds them anew every step (contact/walls/surface_search.h);
+// here they get their history and go through the law with all others.
 #include <algorithm>
 #include <cmath>
 #include <cstring>

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <vector>
 
-#include "contact/cell_search.h"
+#include "contact/overlap/cell_search.h"
 #include "support/least_overlap.h"
 #include "support/random.h"
 #include "support/solids.h"

@@ -7,8 +7,8 @@
 #include <vector>
 
 #include "body/flat_faces.h"
-#include "contact/contact_polygon.h"
 #include "contact/pair_search.h"
+#include "contact/polygons/contact_polygon.h"
 #include "support/bodies.h"
 #include "support/flat_bodies.h"
 #include "support/random.h"

@@ -6,9 +6,9 @@
 
 #include "body/connectivity.h"
 #include "body/local_form.h"
+#include "contact/overlap/polytope.h"
 #include "contact/pair_frame.h"
 #include "contact/pair_search.h"
-#include "contact/polytope.h"
 #include "nurbs/tolerances.h"
 #include "support/bodies.h"
 #include "support/pairs.h"

@@ -7,7 +7,7 @@
 #include <cmath>
 #include <vector>
 
-#include "contact/cylinder_search.h"
+#include "contact/walls/cylinder_search.h"
 #include "support/bodies.h"
 #include "support/flat_bodies.h"
 #include "support/random.h"

@@ -9,9 +9,9 @@
 #include <vector>
 
 #include "body/local_form.h"
-#include "contact/deep_search.h"
+#include "contact/overlap/deep_search.h"
+#include "contact/overlap/polytope.h"
 #include "contact/pair_search.h"
-#include "contact/polytope.h"
 #include "nurbs/affine.h"
 #include "shapes/random_pebble.h"
 #include "shapes/revolved.h"

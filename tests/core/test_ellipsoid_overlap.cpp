@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "contact/ellipsoid_overlap.h"
+#include "contact/overlap/ellipsoid_overlap.h"
 #include "contact/pair_search.h"
 #include "nurbs/tolerances.h"
 #include "shapes/primitives.h"

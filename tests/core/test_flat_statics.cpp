@@ -6,9 +6,9 @@
 #include <cmath>
 #include <vector>
 
-#include "contact/contact_polygon.h"
 #include "contact/pair_memory.h"
 #include "contact/pair_search.h"
+#include "contact/polygons/contact_polygon.h"
 #include "motion/rotation.h"
 #include "support/bodies.h"
 #include "support/flat_bodies.h"

@@ -16,11 +16,11 @@
 #include <vector>
 
 #include "body/support.h"
-#include "contact/cylinder_search.h"
-#include "contact/feature_search.h"
 #include "contact/pair_memory.h"
 #include "contact/pair_search.h"
-#include "contact/surface_search.h"
+#include "contact/walls/cylinder_search.h"
+#include "contact/walls/feature_search.h"
+#include "contact/walls/surface_search.h"
 #include "io/shape_file.h"
 #include "shapes/primitives.h"
 #include "support/bodies.h"

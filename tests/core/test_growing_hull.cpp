@@ -7,7 +7,7 @@
 #include <memory>
 #include <vector>
 
-#include "contact/growing_hull.h"
+#include "contact/overlap/growing_hull.h"
 #include "support/random.h"
 
 namespace nurbs {

@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "contact/half_plane_hull.h"
+#include "contact/overlap/half_plane_hull.h"
 #include "nurbs/tolerances.h"
 #include "support/random.h"
 

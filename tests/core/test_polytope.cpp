@@ -1,8 +1,8 @@
 // The polytope fallback against the separating-axis theorem on boxes, and on bodies Newton can't treat.
 #include <gtest/gtest.h>
 
+#include "contact/overlap/polytope.h"
 #include "contact/pair_search.h"
-#include "contact/polytope.h"
 #include "support/bodies.h"
 #include "support/pairs.h"
 

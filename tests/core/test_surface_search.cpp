@@ -7,7 +7,7 @@
 #include <functional>
 #include <map>
 
-#include "contact/surface_search.h"
+#include "contact/walls/surface_search.h"
 #include "support/bodies.h"
 #include "support/random.h"
 

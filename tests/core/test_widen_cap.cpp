@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "contact/local_bend.h"
-#include "contact/widen_cap.h"
+#include "contact/overlap/widen_cap.h"
 #include "shapes/rounded_polyhedron.h"
 #include "support/bodies.h"
 #include "support/pairs.h"

@@ -1,0 +1,124 @@
+// The last rung: closed forms of overlap, polytopes, rings, cells, in the order of their cost; see
+// polytope.h.
+#include "contact/overlap/polytope.h"
+
+#include <algorithm>
+
+#include "contact/overlap/ball_hull_search.h"
+#include "contact/overlap/cell_search.h"
+#include "contact/overlap/polytope_search.h"
+#include "contact/overlap/ring_search.h"
+#include "contact/overlap/segment_search.h"
+
+namespace nurbs {
+namespace {
+
+constexpr int kPointAttempts = 2;     // flat differences of points may have no hull
+constexpr int kBeforeRings = 64;      // queries before rings of directions are looked for ...
+constexpr int kBentBeforeRings = 95;  // ... of bodies without sharp edges, which caps may do for ...
+constexpr int kAtPoles = 256;         // ... and where the least overlap is along an axis
+constexpr double kPolar = 0.1;        // sine of the angle from it
+
+// Along an axis of revolution, where a ring of directions is hardly one.
+bool is_polar(const PairFrame& pair, const Vec3& d) {
+  const auto along = [&](const Shape& shape, const Mat3& turn) {
+    const Revolution& about = revolution_of(shape);
+    return about.found && !shape.proofs.sphere && d.cross(turn * about.axis).squaredNorm() < kPolar * kPolar;
+  };
+  return along(*pair.a, Mat3::Identity()) || along(*pair.b, pair.turn);
+}
+
+// Rings and cells know few points of the bodies, which may not face each other where it takes three or four
+// to carry the contact.
+__attribute__((noinline)) void make_points_face(const PairFrame& pair, double tolerance, PolytopeResult* r) {
+  const auto off = [](const PolytopeResult& x) {
+    return (x.points.b - x.points.a).cross(x.bracket.direction).norm();
+  };
+  if (!(off(*r) > kFacing * pair.size)) return;
+  PolytopeResult better = *r;
+  if (PolytopeSearch(pair, tolerance, 0.0, false).find_points(&better) && off(better) < off(*r)) *r = better;
+}
+
+bool has_rings(const Shape& shape) {
+  return revolution_of(shape).found || !shape.round_edges.empty();
+}
+
+// What two attempts know together: the narrower one's points, along the direction of the higher lower end.
+PolytopeResult both(const PolytopeResult& x, const PolytopeResult& y, double tolerance) {
+  PolytopeResult r = y.bracket.width() < x.bracket.width() ? y : x;
+  const Bracket& higher = y.bracket.lower > x.bracket.lower ? y.bracket : x.bracket;
+  r.bracket.lower = higher.lower;
+  r.bracket.upper = std::max(std::min(x.bracket.upper, y.bracket.upper), higher.lower);
+  r.bracket.direction = r.points.na = higher.direction;
+  r.points.nb = -higher.direction;
+  r.converged = r.bracket.width() <= tolerance;
+  set_gap(&r);
+  return r;
+}
+
+// What is left where a hull does not close.
+bool search_last(const PairFrame& pair, double tolerance, PolytopeResult* best) {
+  if (!search_rings(pair, tolerance, true, best) && !search_cells(pair, tolerance, best)) return false;
+  make_points_face(pair, tolerance, best);
+  return true;
+}
+
+}  // namespace
+
+PolytopeResult solve_polytope(const PairFrame& pair, const Vec3& seed, double tolerance, double enough) {
+  // A hull that round-off broke (coplanar faces) or that stalled is begun again from other directions, and
+  // its vertices moved at random by far more than round-off and far less than the tolerance (Barber, Dobkin &
+  // Huhdanpaa 1996, section 4: joggled input); the upper bound allows for it.
+  PolytopeResult best;
+  double upper = kFarAway;
+  if (search_segments(pair, tolerance, &best) || search_ball_hulls(pair, tolerance, &best, &upper) ||
+      search_segment_in_ellipsoid(pair, seed, tolerance, &best))
+    return best;
+  Vec3 from = seed;
+  bool points = true;
+  double searched = kFarAway;  // the lower end with which all that is left was tried in vain
+  for (int attempt = 0; attempt < kHullAttempts; ++attempt) {
+    const double joggle = attempt > 0 ? std::min(kJoggle * pair.reach, 0.05 * tolerance) : 0.0;
+    PolytopeSearch search(pair, tolerance, joggle, points);
+    search.bound(upper);
+    if (attempt % 2 == 1) search.let_be();
+    const bool started = search.start(from), flat = search.only_points() && !started;
+    if (flat || attempt + 1 == kPointAttempts) points = false;
+    if (flat) {  // the same attempt, with balls
+      --attempt;
+      continue;
+    }
+    if (started && attempt == 0 && (has_rings(*pair.a) || has_rings(*pair.b))) {
+      const bool bent =
+          !pair.a->lazy_inner_map.known().nodes.empty() && !pair.b->lazy_inner_map.known().nodes.empty();
+      search.run(enough, bent ? kBentBeforeRings : kBeforeRings);
+      best = search.bracket();
+      if (!best.converged && is_polar(pair, best.bracket.direction)) {
+        search.run(enough, kAtPoles);
+        best = search.bracket();
+      }
+      if (!best.converged && search_rings(pair, tolerance, false, &best)) {
+        make_points_face(pair, tolerance, &best);
+        return best;
+      }
+    }
+    if (started) search.run(enough, kHullVertices);
+    if (search.hopeless() && (has_rings(*pair.a) || has_rings(*pair.b))) {
+      best = search.bracket();
+      if (search_last(pair, tolerance, &best)) return best;
+      searched = best.bracket.lower;
+      search.run(enough, kHullVertices);
+    }
+    const PolytopeResult result = search.result();
+    const int spent = attempt > 0 ? best.iterations : 0;
+    best = attempt == 0 || result.converged ? result : both(best, result, tolerance);
+    best.iterations = spent + result.iterations;
+    if (best.converged || best.bracket.lower > enough || (started && !search.stalled())) break;
+    from = best.bracket.direction + kHullTurn * (attempt + 1) * Vec3(0.36, -0.48, 0.8);
+  }
+  if (!best.converged && !(best.bracket.lower > enough) && best.bracket.lower != searched)
+    search_last(pair, tolerance, &best);
+  return best;
+}
+
+}  // namespace nurbs

@@ -1,0 +1,116 @@
+// The contact points of a search that has ended; see polytope_search.h.
+#include <algorithm>
+#include <cmath>
+
+#include "contact/overlap/polytope_search.h"
+
+namespace nurbs {
+namespace {
+
+constexpr double kPlaneBeyond = 4;     // times the least distance, squared: no triangle in it is nearer
+constexpr double kFacingBetter = 0.1;  // of kFacing, that better witnesses are to be off
+constexpr int kMostFacing = 96;        // points spent on better ones
+
+}  // namespace
+
+void set_gap(PolytopeResult* r) {
+  const double apart = r->points.na.dot(r->points.b - r->points.a);
+  r->gap = r->converged ? std::clamp(apart, r->bracket.lower, r->bracket.upper) : r->bracket.lower;
+  part_points(r);
+}
+
+PolytopeResult PolytopeSearch::result() {
+  Vec3 a, b;
+  find_witness(&a, &b);
+  return with_points(a, b);
+}
+
+bool PolytopeSearch::find_points(PolytopeResult* r) {
+  lower_ = r->bracket.lower;
+  upper_ = r->bracket.upper;
+  direction_ = r->bracket.direction;
+  if (!start(direction_)) return false;
+  Vec3 a, b;
+  refine_pair(&a, &b);
+  const int spent = r->iterations;
+  *r = with_points(a, b);
+  r->iterations += spent;
+  return r->converged;
+}
+
+PolytopeResult PolytopeSearch::with_points(const Vec3& a, const Vec3& b) const {
+  PolytopeResult r = bracket();
+  r.points.na = direction_;
+  r.points.nb = -direction_;
+  const Witness& w = witness_[best_];
+  // Onto the planes of the supports: means of others lie a little inside.
+  r.points.a = a + (direction_.dot(w.a - a) + shrink_a_) * direction_;
+  r.points.b = b + (direction_.dot(w.b - b) - shrink_b_) * direction_;
+  r.points.on_a = surface_place(*pair_.a, w.on_a, direction_);
+  r.points.on_b = surface_place(*pair_.b, w.on_b, pair_.direction_on_b(direction_));
+  set_gap(&r);
+  return r;
+}
+
+// What the witnesses of direction_ are to be apart: the hull's point nearest to the origin or, when that is
+// inside, its foot on the supporting plane. (Of a flat of the obstacle, which is several triangles, or of
+// two equal minima other points would not face each other.)
+Vec3 PolytopeSearch::target() const {
+  return std::min(0.0, lower_ + shrink_) * -direction_;
+}
+
+// Points of the bodies that are as nearly so as the supports along direction_ or one of the hull's
+// triangles has them. About a minimum whose cap is proven the hull stays coarse, and what is given away
+// there belongs to neither body: where the supports do not face each other, as on ruled lines, it is made
+// again without.
+void PolytopeSearch::find_witness(Vec3* a, Vec3* b) {
+  if (find_nearest_pair(a, b).off <= kFacing * pair_.size || caps_ == 0) return;
+  drop_caps();
+  Vec3 across;
+  if (start_from_points(0, &across)) refine_pair(a, b);
+}
+
+void PolytopeSearch::refine_pair(Vec3* a, Vec3* b) {
+  for (int k = 0; k < kMostFacing; ++k) {
+    const Facing near = find_nearest_pair(a, b);
+    if (near.off <= std::max(kFacingBetter * kFacing * pair_.size, roundoff()) || near.face < 0) return;
+    const int v = query(near.towards.normalized(), closest_of(hull_.face(near.face), direction_));
+    if (v < 0 || hull_.grow(v, 0.0, near.face) != GrowingHull::Growth::grown) return;
+  }
+}
+
+PolytopeSearch::Facing PolytopeSearch::find_nearest_pair(Vec3* a, Vec3* b) const {
+  const Vec3 target = this->target();
+  *a = witness_[best_].a;
+  *b = witness_[best_].b;
+  Facing near{(*a - *b - target).norm()};
+  double best = kFarAway;
+  Vec3 weights;
+  for (int k = 0; k < hull_.faces(); ++k) {
+    const GrowingHull::Face& f = hull_.face(k);
+    if (!f.alive) continue;
+    const double above = f.normal.dot(target) - f.offset;  // 0 of slivers
+    if (above * above > kPlaneBeyond * best) continue;
+    if (std::any_of(f.vertex.begin(), f.vertex.end(), [&](short v) { return witness_[v].cap; })) continue;
+    const Vec3 &p = hull_.point(f.vertex[0]), &q = hull_.point(f.vertex[1]), &r = hull_.point(f.vertex[2]);
+    const Vec3 w = nearest_on_triangle(p - target, q - target, r - target);
+    const Vec3 towards = target - (w[0] * p + w[1] * q + w[2] * r);
+    const double distance = towards.squaredNorm();
+    if (!(distance < best)) continue;
+    best = distance;
+    near.face = k;
+    near.towards = towards;
+    weights = w;
+  }
+  if (near.face < 0 || !(std::sqrt(best) < near.off)) return near;
+  near.off = std::sqrt(best);
+  *a = *b = Vec3::Zero();
+  for (int i = 0; i < 3; ++i) {
+    const Witness& w = witness_[hull_.face(near.face).vertex[i]];
+    *a += weights[i] * w.a;
+    *b += weights[i] * w.b;
+  }
+  return near;
+}
+
+}  // namespace nurbs
