@@ -41,6 +41,10 @@ float threshold(double angle) {
 double upright_least(const CellBounds& b) {
   return b.stretch.least * std::cos(b.cone) * std::cos(b.cone);
 }
+// Less what joints take that count as smooth.
+double least_of(const Shape& shape, const CellBounds& b) {
+  return shape.small_kinks.inside(std::max(b.min_radius, upright_least(b)));
+}
 // Where joints open, normals between their sides' are supported there. Four patches meet in a corner: no two
 // normals there are further apart than their kinks together.
 bool opens(const Shape& shape) {
@@ -90,7 +94,7 @@ class NodePainter {
         lower(b.axis, M_PI, 0);
         continue;
       }
-      lower(b.axis, b.cone, down(std::max(b.min_radius, upright_least(b))));
+      lower(b.axis, b.cone, down(least_of(shape_, b)));
       if (may_fan(shape_, leaf.cell)) lower(b.axis, b.cone + widest_kink(shape_), 0);
     }
     const double all = shape_.joints.none() ? shape_.patch_curvature.min_radius : 0;
@@ -153,6 +157,7 @@ class StretchPainter {
     const float all = down(shape_.joints.none() ? shape_.patch_curvature.min_radius : 0);
     for (InnerStretch& s : cells_)
       for (int k = 0; k < kStretches; ++k) {
+        take_small_kinks(&s.least[k], &s.most[k]);
         if (!(s.least[k] < all)) continue;
         s.least[k] = all;
         s.most[k] = 0;
@@ -187,6 +192,14 @@ class StretchPainter {
       visit_cells(b.axis, widest, kStretchCells, look);
     else
       for (int cell = 0; cell < static_cast<int>(cells_.size()); ++cell) look(cell);
+  }
+
+  // Concave in the radius along a tangent: a chord is below.
+  void take_small_kinks(float* least, float* most) const {
+    const SmallKinks& kinks = shape_.small_kinks;
+    const double before = *least, low = kinks.inside(before), high = kinks.inside(before + *most);
+    *least = down(low);
+    *most = down((high - low) * (1 - 1e-6));
   }
 
   // A cell's direction is that of the leaf nearest to it.

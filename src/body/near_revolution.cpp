@@ -35,9 +35,10 @@ double way(const Meridian& m, const Meridian::Place& a, const Meridian::Place& b
 
 }  // namespace
 
-NearRevolution find_near_revolution(const std::vector<BezierPatch>& patches, double size) {
+NearRevolution find_near_revolution(const std::vector<BezierPatch>& patches, const Mat3& inertia,
+                                    double size) {
   NearRevolution near;
-  near.revolution = find_revolution(patches, size, kNearRevolution);
+  near.revolution = find_revolution(patches, inertia, size, kNearRevolution);
   near.meridian = make_meridian(patches, near.revolution, size, kNearRevolution);
   if (near.meridian.empty()) return {};
   near.radii = make_profile_radii(near.meridian, patches, size, kNearKink);

@@ -26,7 +26,8 @@ void archive(Archive& a, NearRevolution& s) {
 
 // Of a body whose joints meet and that is none of revolution itself; off that by no more than kNearRevolution
 // of its size.
-NearRevolution find_near_revolution(const std::vector<BezierPatch>& patches, double size);
+NearRevolution find_near_revolution(const std::vector<BezierPatch>& patches, const Mat3& inertia,
+                                    double size);
 
 // What a shape is turned about, exactly or but for few digits; `found` is false of others.
 const Revolution& revolution_of(const Shape& shape);

@@ -137,6 +137,19 @@ bool guess_axis(const std::vector<BezierPatch>& patches, bool arcs_in_u, Revolut
   return largest > 0;
 }
 
+// Of a body whose moments about two principal axes are alike, as those of a body of revolution are, the third
+// one; none where all three are.
+constexpr double kAlikeMoments = 1e-4;  // of the largest
+bool guess_axis(const Mat3& inertia, Revolution* r) {
+  const Eigen::SelfAdjointEigenSolver<Mat3> principal(inertia);
+  const Vec3& m = principal.eigenvalues();  // ascending
+  const double alike = kAlikeMoments * m[2];
+  const bool low = m[1] - m[0] <= alike, high = m[2] - m[1] <= alike;
+  if (low == high) return false;
+  r->axis = principal.eigenvectors().col(low ? 2 : 0);
+  return true;
+}
+
 // Points of a patch on arcs about the axis: one line of parameters, from the profile's ends and inside.
 constexpr int kOnArc = 6, kArcs = 5;
 constexpr double kNoArcs = 1e-6;  // of the size: no refinement of the axis makes up for being off by more
@@ -248,11 +261,15 @@ double out_of_plane(const BezierPatch& patch, const Vec3& axis) {
   return high - low;
 }
 
-Revolution find_revolution(const std::vector<BezierPatch>& patches, double size, double allowed) {
+Revolution find_revolution(const std::vector<BezierPatch>& patches, const Mat3& inertia, double size,
+                           double allowed) {
   const double most = allowed * size;
-  for (const bool arcs_in_u : {true, false}) {
+  enum class From { arcs_in_u, arcs_in_v, moments };
+  for (const From from : {From::arcs_in_u, From::arcs_in_v, From::moments}) {
     Revolution r;
-    if (!guess_axis(patches, arcs_in_u, &r)) continue;
+    const bool guessed =
+        from == From::moments ? guess_axis(inertia, &r) : guess_axis(patches, from == From::arcs_in_u, &r);
+    if (!guessed) continue;
     for (int pass = 0; pass < 2; ++pass) settle_axis(patches, size, most, &r);  // the tilt moves the points
     for (const BezierPatch& patch : patches) {
       double error = out_of_plane(patch, r.axis);
@@ -268,8 +285,9 @@ Revolution find_revolution(const std::vector<BezierPatch>& patches, double size,
   return {};
 }
 
-Revolution find_revolution(const std::vector<BezierPatch>& patches, const Ellipsoid& ellipsoid, double size) {
-  const Revolution r = find_revolution(patches, size, kArcError);
+Revolution find_revolution(const std::vector<BezierPatch>& patches, const Mat3& inertia,
+                           const Ellipsoid& ellipsoid, double size) {
+  const Revolution r = find_revolution(patches, inertia, size, kArcError);
   return r.found ? r : about_axis_of(ellipsoid, size);
 }
 

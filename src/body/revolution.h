@@ -26,11 +26,13 @@ void archive(Archive& a, Revolution& s) {
 // must lie in a plane square to the axis, or have parameter lines of one kind that are circular arcs about
 // it, which is proven from Bernstein coefficients of height and squared radius: turning about the axis is
 // then tangential to the whole surface. Or the body must be a spheroid. Patches that make such a body in yet
-// other parameters are not found. `size`: bounding radius.
-Revolution find_revolution(const std::vector<BezierPatch>& patches, const Ellipsoid& ellipsoid, double size);
+// other parameters are not found. `inertia` of the uniform solid, about the origin; `size`: bounding radius.
+Revolution find_revolution(const std::vector<BezierPatch>& patches, const Mat3& inertia,
+                           const Ellipsoid& ellipsoid, double size);
 
 // The same of arcs that may be off by `allowed` of the size, and whatever the body is else.
-Revolution find_revolution(const std::vector<BezierPatch>& patches, double size, double allowed);
+Revolution find_revolution(const std::vector<BezierPatch>& patches, const Mat3& inertia, double size,
+                           double allowed);
 
 // By how much the heights of a patch's control points along `axis`, unit, differ: 0 in a plane square to it.
 double out_of_plane(const BezierPatch& patch, const Vec3& axis);

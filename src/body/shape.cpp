@@ -239,6 +239,14 @@ Proofs summarise(const Shape& s, const SurfaceBounds& bounds, const KinkSummary&
   return proofs;
 }
 
+double find_pole_spread(const PatchLinks& links, double size) {
+  double most = 0;
+  for (const auto& patch : links)
+    for (const EdgeLink& link : patch)
+      if (link.collapsed) most = std::max(most, link.gap);
+  return most > kJointRoundoff * size ? most : 0;
+}
+
 // What the search over patches needs (patch_maximum.h).
 void enclose_patches(Shape& s) {
   s.bilinear = true;
@@ -265,16 +273,19 @@ void measure(Draft& draft) {
   s.smooth = std::max(kinks.convex, kinks.concave) <= kSmoothKink;
   if (kinks.gap > kJointRoundoff * s.bounding_radius) s.joint_slack = kGapsCrossed * kinks.gap;
   s.ellipsoid = find_ellipsoid(s.patches, s.mass.inertia / s.mass.volume);
-  s.revolution = find_revolution(s.patches, s.ellipsoid, s.bounding_radius);
+  s.revolution = find_revolution(s.patches, s.mass.inertia, s.ellipsoid, s.bounding_radius);
   if (s.joint_slack == 0) s.meridian = make_meridian(s.patches, s.revolution, s.bounding_radius);
   if (s.joint_slack == 0 && !s.revolution.found)
-    s.near_revolution = find_near_revolution(s.patches, s.bounding_radius);
+    s.near_revolution = find_near_revolution(s.patches, s.mass.inertia, s.bounding_radius);
   SurfaceBounds bounds = bound_surface(s, is_sphere(s));
   if (is_sphere(s)) take_as_sphere(s, &bounds);
   const double rounding = least_rounding(s.patches);
   if (rounding < kFarAway) bounds.radii.min_radius = std::max(bounds.radii.min_radius, rounding);
   s.proofs = summarise(s, bounds, kinks);
-  s.patch_curvature = bounds.radii;
+  s.pole_spread = find_pole_spread(s.links, s.bounding_radius);
+  s.small_kinks = find_small_kinks(s.links, s.bounding_radius);
+  s.patch_curvature = {s.small_kinks.inside(bounds.radii.min_radius),
+                       s.small_kinks.outside(bounds.radii.max_radius)};
   s.curvature = add_kinks(s.patch_curvature, kinks);
   const Dent dent = find_dent(s, sample_surface(s.patches), bounds, kinks);
   judge_dent(draft, dent);

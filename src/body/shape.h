@@ -24,6 +24,7 @@
 #include "body/revolution.h"
 #include "body/rolling.h"
 #include "body/round_edges.h"
+#include "body/small_kinks.h"
 #include "body/sphero_polyhedron.h"
 #include "body/support_cells.h"
 #include "nurbs/bezier_patch.h"
@@ -168,13 +169,16 @@ struct Shape {
                                            // support function h(d): 0 if convex, see convexity.h
   double joint_slack = 0;                  // what gaps at joints add to that and to its certificates; 0 where
                                            // the sides meet to round-off
+  double pole_spread = 0;                  // the most that points of a collapsed edge are apart; 0 where that
+                                           // is round-off. Tangents there tell nothing of the body's normals.
+  SmallKinks small_kinks;                  // at joints that count as smooth
   bool smooth = true;                      // no kink above kSmoothKink: normals are continuous
   CurvatureBounds curvature;               // of the body; any kink above 1e-7 rad makes it (0, infinity)
-  CurvatureBounds patch_curvature;         // of the patches alone, joints left out
-  std::vector<PatchRate> rates;            // per patch
-  Proofs proofs;                           // how far the bounds above are proven, and how tight
-  JointDistance joints;                    // to kinked joints: where the patch curvatures hold for the body
-  NormalMap normal_map;                    // local bounds, for bodies with flats or dents
+  CurvatureBounds patch_curvature;  // of the patches, and what small_kinks take; kinked joints left out
+  std::vector<PatchRate> rates;     // per patch
+  Proofs proofs;                    // how far the bounds above are proven, and how tight
+  JointDistance joints;             // to kinked joints: where the patch curvatures hold for the body
+  NormalMap normal_map;             // local bounds, for bodies with flats or dents
   DirectionAtlas atlas;
   LazyInnerMap lazy_inner_map;
   SupportCells support_cells;           // where the hull's supports lie, near dents
@@ -196,6 +200,12 @@ struct Shape {
   // Whether a local maximum of d . x may be no global one.
   bool dented() const { return support_excess > kRoundoff * bounding_radius; }
 };
+
+// What a normal may err by, rad, because a collapsed edge is no point: `shorter` is the shorter tangent's
+// length at scale 1.
+inline double pole_noise(const Shape& shape, double shorter) {
+  return shape.pole_spread > 0 ? kPoleSpreadSafety * shape.pole_spread / shorter : 0;
+}
 
 // Whether there is such a point: memory may hold none, or one of another shape, or no numbers.
 inline bool has_patch(const Shape& shape, const SurfacePoint& at) {

@@ -13,15 +13,16 @@ template <class Archive>
 void archive(Archive& a, Shape& s) {
   auto& [name, stamp, surfaces, patches, surface_of_patch, links, balls, bilinear, mass, gyration,
          inverse_gyration, sphere_like, principal_gyration, principal_axes, bounding_radius, inner_radius,
-         concavity, support_excess, joint_slack, smooth, curvature, patch_curvature, rates, proofs, joints,
-         normal_map, atlas, lazy_inner_map, support_cells, ellipsoid, revolution, meridian, near_revolution,
-         profile_radii, core, ball_hull, inner_balls, round_edges, edge_curves, flats] = s;
+         concavity, support_excess, joint_slack, pole_spread, small_kinks, smooth, curvature, patch_curvature,
+         rates, proofs, joints, normal_map, atlas, lazy_inner_map, support_cells, ellipsoid, revolution,
+         meridian, near_revolution, profile_radii, core, ball_hull, inner_balls, round_edges, edge_curves,
+         flats] = s;
   static_cast<void>(support_cells);  // made again where they are asked for, from the rest
   a(name, stamp, surfaces, patches, surface_of_patch, links, balls, bilinear, mass, gyration,
     inverse_gyration, sphere_like, principal_gyration, principal_axes, bounding_radius, inner_radius,
-    concavity, support_excess, joint_slack, smooth, curvature, patch_curvature, rates, proofs, joints,
-    normal_map, atlas, lazy_inner_map, ellipsoid, revolution, meridian, near_revolution, profile_radii, core,
-    ball_hull, inner_balls, round_edges, edge_curves, flats);
+    concavity, support_excess, joint_slack, pole_spread, small_kinks, smooth, curvature, patch_curvature,
+    rates, proofs, joints, normal_map, atlas, lazy_inner_map, ellipsoid, revolution, meridian,
+    near_revolution, profile_radii, core, ball_hull, inner_balls, round_edges, edge_curves, flats);
 }
 
 std::string pack(const Shape& shape) {

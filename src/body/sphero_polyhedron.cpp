@@ -16,6 +16,7 @@ namespace {
 constexpr int kMostPoints = 64;
 constexpr double kMostError = 5e-11;  // of the bounding radius
 constexpr double kMostKink = 1e-6;    // rad
+constexpr double kKinksMet = 16;      // one after the other between two points
 constexpr double kNearCentre = 1e-3;  // of the radius: further ones are another point's
 constexpr double kExact = 1e-13;      // of the bounding radius: off balls, planes and lines, round-off
 constexpr double kNear = 3e-11;       // ... and few digits
@@ -122,12 +123,15 @@ class Finder {
     if (!(out_.radius > 0) || !balls() || out_.points.empty() || !all_between()) return {};
     out_.error = error();
     if (!(out_.error <= kMostError * shape_.bounding_radius)) return {};
-    if (is_exact()) {
+    if (is_exact() && kinks_are_no_edges()) {
       out_.error += 0.5 * kMostKink * kMostKink * out_.radius;
       return out_;
     }
+    SpheroPolyhedron loose = out_;  // a part of a ball may reach beyond another one's by the kinks between
+    loose.error += 2 * shape_.bounding_radius * largest_kink();
     const auto held = [&](const Vec3& point) { return is_inside(point, out_.radius - out_.error); };
-    return std::all_of(out_.points.begin(), out_.points.end(), held) ? out_ : SpheroPolyhedron();
+    if (std::all_of(out_.points.begin(), out_.points.end(), held)) return out_;
+    return is_exact() && loose.error <= kMostError * shape_.bounding_radius ? loose : SpheroPolyhedron();
   }
 
   BallHull hull() {
@@ -202,6 +206,22 @@ class Finder {
       for (const EdgeLink& link : links)
         if (!(std::abs(link.kink) <= kMostKink || (with_tips && link.collapsed))) return false;
     return true;
+  }
+  // What the support has over `radius` bends upwards at every edge between two points by the way between
+  // them, and downwards at a kink by that times the radius. Points as near to each other as that are no
+  // edge's: where two balls meet in a kink, the body is what they have in common and not their hull.
+  bool kinks_are_no_edges() const {
+    const double least = kKinksMet * out_.radius * largest_kink();
+    for (size_t i = 0; i < out_.points.size(); ++i)
+      for (size_t k = 0; k < i; ++k)
+        if ((out_.points[i] - out_.points[k]).norm() < least) return false;
+    return true;
+  }
+  double largest_kink() const {
+    double most = 0;
+    for (const auto& links : shape_.links)
+      for (const EdgeLink& link : links) most = std::max({most, std::abs(link.kink), link.kink_bound});
+    return most;
   }
   bool all_between() {
     for (int k = 0; k < static_cast<int>(shape_.patches.size()); ++k)

@@ -42,8 +42,9 @@ void archive(Archive& a, SpheroPolyhedron& s) {
 //     the direction of its normal from the part's centre v, so that h(d) - radius is v . d there, continuous,
 //     and as convex where two parts meet as h is: the largest of all v . d. This rests on normals and
 //     convexity as measured (kinks, Shape::concavity), at slivers to round-off only.
-// Of what few digits have moved (by 3e-11 of the body, at most) the balls, smaller by `error`, are proven to
-// lie inside instead. Polyhedra: bilinear patches, whose corners are of the body and have it in their hull.
+// Of what few digits have moved (by 3e-11 of the body, at most), and where joints have kinks beyond
+// round-off, the balls, smaller by `error`, are proven to lie inside instead. Polyhedra: bilinear patches,
+// whose corners are of the body and have it in their hull.
 SpheroPolyhedron find_sphero_polyhedron(const Shape& shape);
 
 // Hulls of a few balls of different radii, as tapered capsules are; the tip of a cone is a ball of radius 0.

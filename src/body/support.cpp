@@ -190,6 +190,7 @@ Normal normal_at(const Shape& shape, const Vec3& su, const Vec3& sv) {
   const double shorter2 = std::min(su.squaredNorm(), sv.squaredNorm());
   if (shorter2 * shorter2 < kNearPole * kNearPole * product2)
     normal.noise += kTangentNoise * shape.bounding_radius / std::sqrt(shorter2);
+  normal.noise += pole_noise(shape, std::sqrt(shorter2));
   return normal;
 }
 
@@ -257,7 +258,8 @@ Normal set_point(const Shape& shape, const Vec3& d, const SurfacePoint& at, Supp
 // No point of the body is higher along d than this, which is not below h, the height of one: h and `excess`,
 // or of a sphero-polyhedron less.
 double upper_bound(const Shape& shape, const Vec3& d, double h, double excess) {
-  const double roundoff = kRoundoff * shape.bounding_radius, upper = h + excess + roundoff;
+  const double roundoff = kRoundoff * shape.bounding_radius + shape.small_kinks.slack,
+               upper = h + excess + roundoff;
   const SpheroPolyhedron& core = shape.core;
   if (!core.found()) return upper;
   const double height = d.dot(core.points[core.support(d)]) + core.radius + core.error + roundoff;

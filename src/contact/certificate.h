@@ -87,7 +87,7 @@ inline Bracket certify(const PairFrame& pair, const PointPair& p, double noise_a
   const bool apart = core.dot(mean) > 0 && distance > kNoDirection * pair.reach;
   bracket.direction = apart ? Vec3(core / distance) : Vec3(mean.normalized());
   const Vec3& d = bracket.direction;
-  const double roundoff = kRoundoff * pair.reach;
+  const double roundoff = pair.noise;
   bracket.angle2 = std::max((d - p.na).squaredNorm(), (d + p.nb).squaredNorm());
   bracket.unique = rho_a + rho_b;
   const auto dented = [](const Shape& shape, const RollingRadii& radii) {
@@ -95,7 +95,12 @@ inline Bracket certify(const PairFrame& pair, const PointPair& p, double noise_a
   };
   bracket.dented = dented(*pair.a, radii_a) || dented(*pair.b, radii_b);
   const double slack = pair.scale_a * pair.a->joint_slack + pair.scale_b * pair.b->joint_slack;
-  bracket.upper = distance - rho_a - rho_b + slack + roundoff;
+  // A ball that touches along a normal a little off: its centre, by rho noise to the side.
+  const auto beside = [&](double rho, double noise, const Vec3& out) {
+    return noise > 0 ? rho * noise * ((d - out).norm() + noise * (1 + rho / distance)) : 0;
+  };
+  bracket.upper = distance - rho_a - rho_b + slack + roundoff + beside(rho_a, std::min(noise_a, 1.0), p.na) +
+                  beside(rho_b, std::min(noise_b, 1.0), -p.nb);
   bracket.lower = d.dot(p.b - p.a) - support_excess(*pair.a, pair.scale_a, radii_a, d, p.na, noise_a) -
                   support_excess(*pair.b, pair.scale_b, radii_b, -d, p.nb, noise_b) - roundoff;
   if (!(d.squaredNorm() > 0)) bracket.lower = -kFarAway;

@@ -27,6 +27,7 @@ struct Sides {
   V normal;                        // outward, unit
   WideMask plain;                  // not next to a pole
   Wide inner, outer, slack, near;  // RollingRadii, lengths of the lab
+  Wide noise;                      // of the normal, rad
 };
 
 // Both tangents, fundamental forms, and the normal's own derivatives.
@@ -63,7 +64,7 @@ NURBS_INLINE Sides look(unsigned open, const Shape* const (&shape)[kWidth], cons
   constexpr double kLost = kNearPole * kNearPole;  // nearer, round-off counts in the certificate
   out.plain = (lu >= kLost * lv) & (lv >= kLost * lu);
   const V area = cross(su, sv), n = normalized(area);
-  out.inner = out.outer = out.slack = out.near = Wide{};
+  out.inner = out.outer = out.slack = out.near = out.noise = Wide{};
   Wide size{};
   for (int l = 0; l < kWidth; ++l) {
     if (!(open >> l & 1)) continue;
@@ -73,9 +74,10 @@ NURBS_INLINE Sides look(unsigned open, const Shape* const (&shape)[kWidth], cons
     out.outer[l] = r.outer;
     out.slack[l] = r.slack;
     out.near[l] = r.near;
+    if (shape[l]->pole_spread > 0) out.noise[l] = pole_noise(*shape[l], std::sqrt(std::min(lu[l], lv[l])));
     dented[l] = dented[l] || (r.slack > kRoundoff * shape[l]->bounding_radius && !(r.near < kFarAway));
   }
-  out.plain &= norm2(area) > lost_area2<Wide>(lu + lv, size);
+  out.plain &= (norm2(area) > lost_area2<Wide>(lu + lv, size)) & (out.noise < kNearPole);
   out.inner *= scale;
   out.outer *= scale;
   out.slack *= scale;
@@ -91,8 +93,10 @@ NURBS_INLINE Sides look(unsigned open, const Shape* const (&shape)[kWidth], cons
   return out;
 }
 
-// Excess of h(d) over d . (surface point), |d - n|^2 = chord2; of a body with this bounding radius.
-NURBS_INLINE Wide excess(const Sides& side, const Wide& radius, const Wide& chord2) {
+// Excess of h(d) over d . (surface point), |d - n|^2 = least2, but for the normal's noise; of a body with
+// this bounding radius.
+NURBS_INLINE Wide excess(const Sides& side, const Wide& radius, const Wide& least2, bool any_noise) {
+  const Wide chord2 = any_noise ? Wide(least2 + side.noise * (2.0 * root(least2) + side.noise)) : least2;
   const Wide rolling = 0.5 * side.outer * chord2, wedge = 2.0 * radius * root(chord2);
   return select((chord2 <= kNormalMargin * kNormalMargin) & (side.near < kFarAway), 0.5 * side.near * chord2,
                 smaller(rolling, wedge) + side.slack);
@@ -105,7 +109,8 @@ struct BracketLanes {
 };
 
 NURBS_INLINE BracketLanes certify(const JointLanes& pairs, const Sides& a, const Sides& b,
-                                  const Wide& radius_a, const Wide& radius_b, const Wide& joint_slack) {
+                                  const Wide& radius_a, const Wide& radius_b, const Wide& joint_slack,
+                                  const Wide& noise, bool any_noise) {
   BracketLanes out;
   const Wide rho_a = smaller(a.inner, pairs.reach), rho_b = smaller(b.inner, pairs.reach);
   const V between = b.at.s - a.at.s, core = between + rho_a * a.normal - rho_b * b.normal;
@@ -113,12 +118,16 @@ NURBS_INLINE BracketLanes certify(const JointLanes& pairs, const Sides& a, const
   out.apart = (dot(core, a.normal - b.normal) > 0.0) & (distance > kNoDirection * pairs.reach);
   out.direction = (1.0 / distance) * core;
   const Wide chord2_a = norm2(out.direction - a.normal), chord2_b = norm2(out.direction + b.normal);
-  const Wide roundoff = kRoundoff * pairs.reach;
   out.angle2 = larger(chord2_a, chord2_b);
   out.unique = rho_a + rho_b;
-  out.upper = distance - rho_a - rho_b + joint_slack + roundoff;
-  out.lower =
-      dot(out.direction, between) - excess(a, radius_a, chord2_a) - excess(b, radius_b, chord2_b) - roundoff;
+  out.upper = distance - rho_a - rho_b + joint_slack + noise;
+  // A ball that touches along a normal a little off.
+  const auto beside = [&](const Wide& rho, const Wide& off, const Wide& chord2) -> Wide {
+    return rho * off * (root(chord2) + off * (1.0 + rho / distance));
+  };
+  if (any_noise) out.upper += beside(rho_a, a.noise, chord2_a) + beside(rho_b, b.noise, chord2_b);
+  out.lower = dot(out.direction, between) - excess(a, radius_a, chord2_a, any_noise) -
+              excess(b, radius_b, chord2_b, any_noise) - noise;
   return out;
 }
 
@@ -211,7 +220,8 @@ bool confirm(int l, JointLanes* pairs) {
 }  // namespace
 
 unsigned follow_joints(unsigned asked, double enough, JointLanes* pairs) {
-  Wide radius_a{}, radius_b{}, joint_slack{};
+  Wide radius_a{}, radius_b{}, joint_slack{}, small_kinks{};
+  bool spread = false;  // of any pole
   Parameters at{};
   for (int l = 0; l < kWidth; ++l) {
     pairs->iterations[l] = 0;
@@ -224,6 +234,8 @@ unsigned follow_joints(unsigned asked, double enough, JointLanes* pairs) {
     radius_a[l] = a.bounding_radius;
     radius_b[l] = b.bounding_radius;
     joint_slack[l] = pairs->scale_a[l] * a.joint_slack + pairs->scale_b[l] * b.joint_slack;
+    small_kinks[l] = pairs->scale_a[l] * a.small_kinks.slack + pairs->scale_b[l] * b.small_kinks.slack;
+    spread |= a.pole_spread > 0 || b.pole_spread > 0;
     at.au[l] = pairs->on_a[l].u;
     at.av[l] = pairs->on_a[l].v;
     at.bu[l] = pairs->on_b[l].u;
@@ -231,6 +243,7 @@ unsigned follow_joints(unsigned asked, double enough, JointLanes* pairs) {
   }
   radius_a *= pairs->scale_a;
   radius_b *= pairs->scale_b;
+  const Wide noise = kRoundoff * pairs->reach + small_kinks;
 
   unsigned open = asked, found = 0, failed = 0;
   for (int k = 0; k < kFollowedIterations && open != 0; ++k) {
@@ -250,7 +263,7 @@ unsigned follow_joints(unsigned asked, double enough, JointLanes* pairs) {
         look(open, pairs->a, pairs->on_a, pairs->scale_a, pairs->turn_a, pairs->jet_a, pairs->dented);
     Sides b = look(open, pairs->b, pairs->on_b, pairs->scale_b, pairs->turn_b, pairs->jet_b, pairs->dented);
     b.at.s = b.at.s + pairs->offset;
-    const BracketLanes bracket = certify(*pairs, a, b, radius_a, radius_b, joint_slack);
+    const BracketLanes bracket = certify(*pairs, a, b, radius_a, radius_b, joint_slack, noise, spread);
     const SymmetricLanes first_a = first_form(a.at), first_b = first_form(b.at),
                          bend_a = second_form(a.at, a.normal), bend_b = second_form(b.at, a.normal);
     const StepLanes step = newton_step(a, b, first_a, bend_a, bend_b);
@@ -270,9 +283,9 @@ unsigned follow_joints(unsigned asked, double enough, JointLanes* pairs) {
     const Wide turn_a = norm2(of_a - a.normal) + kNoTurn, turn_b = norm2(of_b + b.normal) + kNoTurn;
     const V normal = normalized(turn_b * of_a + turn_a * of_b);
     const V at_a = taylor(a.at, step.au, step.av), at_b = taylor(b.at, step.bu, step.bv);
-    const Wide noise = kRoundoff * pairs->reach;
+    const Wide roundoff = kRoundoff * pairs->reach;
     const WideMask nearer =
-        misfit2(normal, at_b - at_a) <= kNearer2 * misfit2(a.normal, b.at.s - a.at.s) + noise * noise;
+        misfit2(normal, at_b - at_a) <= kNearer2 * misfit2(a.normal, b.at.s - a.at.s) + roundoff * roundoff;
     const WideMask refined = usual & nearer & first_b.regular() &
                              turns_linearly(a.at, first_a, step.au, step.av) &
                              turns_linearly(b.at, first_b, step.bu, step.bv);

@@ -113,7 +113,8 @@ struct Normal {
   bool polar;
   double noise = 0;  // rad: of the tangents' round-off, where that counts; kNoNormal where there is none
 };
-NURBS_INLINE Normal outward(const JetLanes& j, const SurfacePoint& at, double size) {
+NURBS_INLINE Normal outward(const JetLanes& j, const SurfacePoint& at, const Shape& shape, double scale) {
+  const double size = scale * shape.bounding_radius;
   const Vec3 su = j.at(Slot::kSu), sv = j.at(Slot::kSv);
   const double lu = su.squaredNorm(), lv = sv.squaredNorm();
   constexpr double kLost = kPoleNormal * kPoleNormal, kFading = 1e4, kNear = kNearPole * kNearPole;
@@ -132,6 +133,8 @@ NURBS_INLINE Normal outward(const JetLanes& j, const SurfacePoint& at, double si
   if ((fades ? area2 < kNear * faded2 * longer : shorter < kNear * longer) ||
       area2 <= lost_area2(speed2, size))
     n.noise = area2 > 0 ? std::min(kNoNormal, kTangentNoise * size * std::sqrt(speed2 / area2)) : kNoNormal;
+  if (shape.pole_spread > 0)
+    n.noise = std::min(kNoNormal, n.noise + pole_noise(shape, std::sqrt(std::max(faded2, shorter)) / scale));
   n.direction.normalize();
   return n;
 }
@@ -255,8 +258,8 @@ JointSolution solve_joint(const PairFrame& pair, const SurfacePoint& on_a, const
     evaluate(pair, frame_b, out);
     p.a = out.jet_a.at(Slot::kS);
     p.b = out.jet_b.at(Slot::kS);
-    const Normal na = outward(out.jet_a, p.on_a, pair.scale_a * pair.a->bounding_radius),
-                 nb = outward(out.jet_b, p.on_b, pair.scale_b * pair.b->bounding_radius);
+    const Normal na = outward(out.jet_a, p.on_a, *pair.a, pair.scale_a),
+                 nb = outward(out.jet_b, p.on_b, *pair.b, pair.scale_b);
     p.na = na.direction;
     p.nb = nb.direction;
     out.bracket = certify(pair, p, na.noise, nb.noise);

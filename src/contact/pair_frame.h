@@ -19,6 +19,7 @@ struct PairFrame {
   Vec3 offset;   // B's centre of mass
   double size;   // smaller bounding radius of the two, the scale of `tolerance`
   double reach;  // larger of them, the scale of round-off
+  double noise;  // round-off of a length, and what the balls that touch the bodies may be off them by
 
   PairFrame(const Particle& pa, const Particle& pb)
       : a(pa.shape), b(pb.shape), scale_a(pa.scale), scale_b(pb.scale), axes_a(pa.q.toRotationMatrix()) {
@@ -27,6 +28,7 @@ struct PairFrame {
     const double ra = scale_a * a->bounding_radius, rb = scale_b * b->bounding_radius;
     size = ra < rb ? ra : rb;
     reach = ra < rb ? rb : ra;
+    noise = kRoundoff * reach + scale_a * a->small_kinks.slack + scale_b * b->small_kinks.slack;
   }
 
   // Whether points and a ball stand for a body of the pair, to little more than round-off of the tolerance.

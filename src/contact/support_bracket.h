@@ -27,7 +27,7 @@ inline Bracket bracket_along(const PairFrame& pair, const Vec3& d, double upper,
   const Vec3 core = (p.b - b.radius * (pair.turn * b.normal)) - (p.a - a.radius * a.normal);
   const double slack = pair.scale_a * pair.a->joint_slack + pair.scale_b * pair.b->joint_slack;
   const double unique = a.radius + b.radius;
-  const double most = core.dot(d) > 0 ? core.norm() - unique + slack + kRoundoff * pair.reach : kFarAway;
+  const double most = core.dot(d) > 0 ? core.norm() - unique + slack + pair.noise : kFarAway;
   return {-upper, most, d, 0, unique};
 }
 

@@ -511,6 +511,8 @@ void FixWallNurbs::post_force(int) {
   step.setup = update->setupflag != 0;
   step.changed = pair != nullptr && pair->changed();
   step.ledger = ledger_;
+  for (int k = 0; k < 3; ++k)
+    if (domain->periodicity[k]) step.period[k] = nurbs_host::box_edge(*domain, k);
   step.settings = settings_;
   step.laws = &law_;
   step.model = models_.get();

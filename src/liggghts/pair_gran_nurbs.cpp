@@ -284,7 +284,8 @@ void PairGranNurbs::hand_in_neighbours() {
     if (short_box) recall_images(i, shortest);
     for (int jj = 0; jj < list->numneigh[i]; ++jj) {
       const int j = list->firstneigh[i][jj] & NEIGHMASK;
-      if (proofs[jj].stamp == 0) history.recall(i, tag[j], proofs + jj);
+      // Of several images of one pair a tag does not tell which.
+      if (!short_box && proofs[jj].stamp == 0) history.recall(i, tag[j], proofs + jj);
       const bool swap = is_swapped(i, j);
       stages_.add_neighbour(swap ? j : i, swap ? i : j, proofs + jj);
     }

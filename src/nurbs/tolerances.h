@@ -147,12 +147,13 @@ constexpr double kSameSupport = 1e-6;       // points closer than this are one l
 constexpr double kStepTolerance = 1e-13;    // a step shorter than this is round-off
 constexpr double kSufficientAscent = 1e-4;  // share of the gain a step's slope promises that it must bring
 constexpr double kOnEdge = 1e-12;           // a parameter this near 0 or 1 is on the patch's edge
-constexpr double kPoleMetric = 1e-26;   // |S_u|^2 this much smaller than |S_v|^2: at a pole, up to round-off
-constexpr double kPoleNormal = 1e-8;    // nearer to a pole than this (relative speed of the parameters) its
-                                        // normal is taken from the limit, which errs by as much
-constexpr double kPoleSpeed = 1e-6;     // root of |Su x Sv| over the bounding radius, and ...
-constexpr double kLeastSine = 1e-4;     // ... sine between the tangents, below which a normal is no proof
-constexpr double kNormalNoise = 4e-16;  // round-off of a normal whose tangents are at right angles
+constexpr double kPoleMetric = 1e-26;    // |S_u|^2 this much smaller than |S_v|^2: at a pole, up to round-off
+constexpr double kPoleNormal = 1e-8;     // nearer to a pole than this (relative speed of the parameters) its
+                                         // normal is taken from the limit, which errs by as much
+constexpr double kPoleSpreadSafety = 4;  // times what a collapsed edge spreads, tangents may be off by
+constexpr double kPoleSpeed = 1e-6;      // root of |Su x Sv| over the bounding radius, and ...
+constexpr double kLeastSine = 1e-4;      // ... sine between the tangents, below which a normal is no proof
+constexpr double kNormalNoise = 4e-16;   // round-off of a normal whose tangents are at right angles
 constexpr double kTangentNoise = 4 * kRoundoff;  // of the body: round-off of a surface tangent
 constexpr double kNormalLost = 1e-9;             // rad, of a normal's round-off: below, it does not count
 constexpr double kFlatCurvature = 1e-12;   // over the bounding radius: a curvature below this says nothing

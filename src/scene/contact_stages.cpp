@@ -530,6 +530,19 @@ void ContactStages::apply_law(ContactBlock& block, const Results& results) {
     step_.ledger ? apply_law<true>(block, first, results) : apply_law<false>(block, first, results);
 }
 
+// A length: contacts that moved no further are where they were.
+double ContactStages::same_place(int a, int b, const Vec3& apart) const {
+  return std::min(10 * step_.settings.tolerance, kSamePose) * smaller_radius(a, b) +
+         1e-13 * (apart.norm() + load(record(a).x).norm());
+}
+
+// Whether a contact is where its state was made.
+bool ContactStages::is_where_left(int a, const ContactGeometry& geometry, double same,
+                                  ContactState* state) const {
+  if (a == -1) follow_wrap(geometry, same, state);
+  return state->dt > 0 && same_geometry(*state, geometry, same);
+}
+
 // The state stays as it is when the bodies are where it was made, so that a run in two parts moves as one;
 // else it is made anew.
 void ContactStages::start_run(ContactBlock& block, int lane, const Results& results) {
@@ -539,18 +552,16 @@ void ContactStages::start_run(ContactBlock& block, int lane, const Results& resu
   const ContactCoefficients law = coefficients(block, lane);
   if (results.touching[lane] != 0) {
     block.get(lane, kStateField, kContactStateSize, &state);
-    const double same = std::min(10 * step_.settings.tolerance, kSamePose) * smaller_radius(a, b) +
-                        1e-13 * (results.offset_of(lane).norm() + load(record(a).x).norm());
-    if (a == -1) follow_wrap(geometry, same, &state);
-    const bool goes_on = !step_.changed && state.dt > 0 && same_geometry(state, geometry, same);
+    const bool same = is_where_left(a, geometry, same_place(a, b, results.offset_of(lane)), &state);
+    const bool stays = same && !step_.changed;
     if (step_.model != nullptr) {
-      if (goes_on)
+      if (stays)
         load_model(block, lane, state);
       else
         ask_model(block, lane, geometry, false);
       return;
     }
-    if (!goes_on && !set_contact(law, geometry, motion_of(record(a)), motion_of(record(b)), state))
+    if (!stays && !set_contact(law, geometry, motion_of(record(a)), motion_of(record(b)), state))
       counts_.value[ContactCounts::unresolved] += share(a, b);
   }
   block.set(lane, kStateField, kContactStateSize, &state);

@@ -66,6 +66,7 @@ struct WallContact {
   ContactResult result;  // points in lab axes from the lab's origin; A is the wall
   double weight = 1;     // +1, or below 0: what other contacts count twice
   Vec3 velocity = Vec3::Zero(), spin = Vec3::Zero();  // of the wall at point_a; lab
+  bool moves = false;                                 // the wall itself, not its surface alone, as a belt's
   int mark = 0;                                       // the caller's
   // At a point of a plane that stands still: a contact that goes on there follows by itself.
   bool face = false;
@@ -91,6 +92,7 @@ class ContactStages {
     bool changed = false;  // with setup: forces are not those of the step before, if there was one
     bool ledger = false;   // count what is dissipated
     ContactSettings settings;
+    Vec3 period[3] = {Vec3::Zero(), Vec3::Zero(), Vec3::Zero()};  // of the box, x first; 0 where it ends
     // Laws by types of bodies: number types[a] * type_count + types[b]; without types number 0.
     const int* types = nullptr;
     int type_count = 0;
@@ -228,6 +230,8 @@ class ContactStages {
   void serve(ContactBlock& block, int first, Results& results) const;
   void follow_surfaces(ContactBlock& block, int first, Results& results) const;
   void solve_lane(ContactBlock& block, int lane, Results& results);
+  double same_place(int a, int b, const Vec3& apart) const;
+  bool is_where_left(int a, const ContactGeometry& geometry, double same, ContactState* state) const;
   void start_run(ContactBlock& block, int lane, const Results& results);
   void close(ContactBlock& block, int lane);
   void release(ContactBlock& block, int lane, double lower);
@@ -318,6 +322,8 @@ class ContactStages {
     double normal_energy = 0, tangential_energy = 0;
     Vec3 spring = Vec3::Zero();  // mean of the tangential springs, weighted with the normal ones
   };
+  bool stands_as_left(const FlatContact& flat, const PolygonState& state, int a, int b) const;
+  void forget_flat(ContactBlock& block, int lane);
   bool serve_flat(ContactBlock& block, int lane, LeftPolygon* left);
   bool remake(ContactBlock& block, int lane, FlatContact& flat, PolygonState& state, double overlap);
   void run_flat(ContactBlock& block, int lane, FlatContact& flat, const PolygonState& state);

@@ -181,11 +181,36 @@ bool ContactStages::make_flat(ContactBlock& block, int lane, const Results& sing
   return true;
 }
 
+// At the start of a run: whether the bodies are where the last step left them. Commands may have moved them.
+bool ContactStages::stands_as_left(const FlatContact& flat, const PolygonState& state, int a, int b) const {
+  const double same = same_place(a, b, offset(a, b));
+  for (int k = 0; k < state.count; ++k) {
+    ContactState point;
+    flat.points.get(k, kStateField, kContactStateSize, &point);
+    const ContactGeometry geometry{-state.gap[k], state.normal, state.arm_a[k], state.arm_b[k]};
+    if (point.active != 0 ? !is_where_left(a, geometry, same, &point) : state.gap[k] < -same) return false;
+  }
+  return true;
+}
+
+// The pair's one contact again, as if there had been none.
+void ContactStages::forget_flat(ContactBlock& block, int lane) {
+  pool_.drop_flat(block.proof[lane]->contact);
+  const ContactState none{};
+  block.set(lane, kStateField, kContactStateSize, &none);
+  block.field[kWeight][lane] = 1;
+  block.until[lane] = 0;
+}
+
 // One step of a pair that has a polygon; false when it has left it, and the single contact serves again.
 bool ContactStages::serve_flat(ContactBlock& block, int lane, LeftPolygon* left) {
   const int a = block.a[lane], b = block.b[lane];
   FlatContact& flat = *pool_.flat_of(block, lane);
   PolygonState state = now(flat.polygon, *step_.bodies, wall_frame(a), a, b);
+  if (step_.setup && !stands_as_left(flat, state, a, b)) {
+    forget_flat(block, lane);
+    return false;
+  }
   const PolygonVerdict verdict = judge(flat.polygon, state);
   double& until = flat.points.until[0];
   const double way = clear_way(a, b, &until);

@@ -102,6 +102,7 @@ void SurfaceWall::end_near(const std::vector<TriangleArray>& meshes) {
 void SurfaceWall::find(const ContactStages::Step& step, const std::vector<TriangleArray>& meshes,
                        double moved, PairProof* heads, ContactStages* stages) {
   path_ += moved;
+  moves_ = moved > 0;
   still_ = kind_ == Kind::mesh && path_ == 0 &&
            std::all_of(meshes.begin(), meshes.end(), [](const TriangleArray& m) { return !m.velocity; });
   overflows_ = 0;
@@ -151,6 +152,7 @@ void SurfaceWall::find_for(int body, const ContactStages::Step& step,
     f.weight = c.weight;
     f.name = name_of(c, body, meshes);
     f.region.reset();
+    f.moves = moves_;
     f.face = still_ && c.piece == SurfaceContact::face;
     if (c.flat) f.region = plane_region(patches_[patch_of_[body]]->mesh, c.plane, particle.x);
     f.path = step.bodies->path()[body] + path_;

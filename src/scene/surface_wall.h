@@ -92,7 +92,7 @@ class SurfaceWall {
   std::deque<TubeSurvey> surveys_;  // of a tube
   int patches_used_ = 0, bodies_near_ = 0, overflows_ = 0;
   double path_ = 0;  // of the wall since the last end_near
-  bool still_ = false, by_triangle_ = true;
+  bool still_ = false, moves_ = false, by_triangle_ = true;
   std::vector<Triangle> triangles_;
   SurfaceContacts contacts_;
   WallContact found_[kSurfaceContacts];

@@ -12,6 +12,18 @@ namespace {
 constexpr double kSameSide = 0.7;             // cosine between normals: 45 degrees
 constexpr int kListedSize = 16 + kProofSize;  // doubles of a listed contact beside its record: see pack_list
 
+// The whole periods in a way; each has no component along the axes after its own.
+Vec3 periods_in(const Vec3 (&period)[3], Vec3 way) {
+  Vec3 sum = Vec3::Zero();
+  for (int k = 2; k >= 0; --k) {
+    if (period[k][k] == 0) continue;
+    const Vec3 whole = std::round(way[k] / period[k][k]) * period[k];
+    sum += whole;
+    way -= whole;
+  }
+  return sum;
+}
+
 }  // namespace
 
 std::int32_t ContactStages::add_listed(const ContactRecord& record) {
@@ -85,6 +97,13 @@ void ContactStages::update_listed(std::int32_t number, int body, const WallConta
   if (FlatContact* flat = pool_.flat(number); flat && p.region) {  // the wall may have moved
     store(p.region->normal, flat->polygon.normal);
     flat->polygon.offset = p.region->normal.dot(p.region->origin - x);  // it stands back already
+    // ... and the outline that the points slide over with it.
+    const Vec3 velocity = load(p.record.velocity), spin = load(p.record.spin);
+    if (known && found.moves && !step_.setup)
+      for (double(&mark)[3] : flat->polygon.mark) {
+        const Vec3 at = load(mark);
+        store(Vec3(at + step_.dt * (velocity + spin.cross(at))), mark);
+      }
   }
   if (found.weight < 0) block.field[kWeight][lane] = found.weight;
   p.follows = known && may_follow(number, body, found);
@@ -136,10 +155,10 @@ int ContactStages::list_former(int body, std::int32_t head, Former* former) {
     block.get(lane, kStateField, kContactStateSize, &state);
     BodyRecord& wall = partner(n).record;
     // A body that comes back through a periodic border takes its walls along.
-    const Vec3 moved = load(b.x) - load(partner(n).body);
-    if (moved.squaredNorm() > b.radius * b.radius) {
-      store(Vec3(load(wall.x) + moved), wall.x);
-      partner(n).level += load(state.normal).dot(moved);
+    const Vec3 wrapped = periods_in(step_.period, load(b.x) - load(partner(n).body));
+    if (!wrapped.isZero()) {
+      store(Vec3(load(wall.x) + wrapped), wall.x);
+      partner(n).level += load(state.normal).dot(wrapped);
     }
     Former& f = former[count++];
     f = {n, load(state.normal), load(wall.x) + load(state.arm_a), sign(block, lane) < 0, false, false};

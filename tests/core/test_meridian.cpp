@@ -41,6 +41,13 @@ std::vector<ShapePointer> bodies_of_revolution(Random& random) {
   all.push_back(make_shape("egg", egg(1, 0.8, 1.5)));
   all.push_back(make_shape("rounded cylinder", test::rounded_cylinder(1, 0.8, 0.2)));
   all.push_back(make_shape("polar", revolved_ellipsoid(1, 0.2)));
+  // From pole to pole: no arc at any patch's rim; and arcs in u of some patches, in v of others.
+  const NurbsSurface whole =
+      surface_of_revolution({Vec3(0, -1, 1), Vec3(0.9, -1, 1), Vec3(0.7, 1.5, 1), Vec3(0, 1.5, 1)});
+  all.push_back(make_shape("one curve", {whole}));
+  std::vector<NurbsSurface> mixed = biconvex_tablet(1, 0.4, 1.5, 0.05);
+  for (size_t k = 0; k < mixed.size(); k += 2) mixed[k] = swap_uv(mixed[k]);
+  all.push_back(make_shape("mixed", mixed));
   return all;
 }
 

@@ -519,6 +519,27 @@ TEST(SavedCases, flat_faces_that_narrow_to_a_tip) {
   }
 }
 
+// Few digits leave a collapsed edge a scrap some 1e-8 of the body long, whose tangents are digits: what they
+// make was taken as a normal, and contacts at loose tolerances came out apart by a fifth of the body, or
+// turned round.
+TEST(SavedCases, poles_that_are_scraps) {
+  for (const std::string name : {"pole-scraps", "pole-scraps-reversed"}) {
+    PairCase pair = read_pair_case("tests/cases/" + name + ".json");
+    ASSERT_GT(std::max(pair.shape_a->pole_spread, pair.shape_b->pole_spread), 0) << name;
+    const double size =
+        std::min(pair.a.scale * pair.a.shape->bounding_radius, pair.b.scale * pair.b.shape->bounding_radius);
+    for (const double tolerance : {pair.settings.tolerance, 1e-4, 1e-5, 1e-6, 1e-9}) {
+      pair.settings.tolerance = tolerance;
+      double memory[kPairMemorySize] = {0};
+      const ContactResult r = find_contact(pair.a, pair.b, pair.settings, memory);
+      EXPECT_EQ(r.status, Status::converged) << name << " " << tolerance;
+      EXPECT_NEAR(r.gap, 0, std::max(tolerance, 1e-6) * size) << name << " " << tolerance;
+      EXPECT_NEAR(-test::overlap_along(pair.a, pair.b, r.normal), r.gap, 2 * tolerance * size)
+          << name << " " << tolerance;
+    }
+  }
+}
+
 // Tip on tip the least overlap is nearly the same all round the axis; of few digits, which keep the bodies
 // from being ones of revolution, it was left open by up to 4e-5, where 15 digits closed it.
 TEST(Solids, tips_of_few_digits_close) {

@@ -88,7 +88,7 @@ class CellSearch {
         balls_(a_.ball + b_.ball),
         points_a_(*pair.a, kSupportShare * tolerance / pair.scale_a, kMostNoise * tolerance / pair.scale_a),
         points_b_(*pair.b, kSupportShare * tolerance / pair.scale_b, kMostNoise * tolerance / pair.scale_b),
-        noise_(8 * kRoundoff * pair.reach + a_.error + b_.error) {}
+        noise_(8 * pair.noise + a_.error + b_.error) {}
 
   bool run(PolytopeResult* result) {
     best_ = -result->bracket.lower;

@@ -120,7 +120,7 @@ class DeepSearch {
         inner_a_(pair.a->lazy_inner_map.known()),
         inner_b_(pair.b->lazy_inner_map.known()),
         tolerance_(tolerance),
-        noise_(8 * kRoundoff * pair.reach),
+        noise_(8 * pair.noise),
         widest_(pair.scale_a * pair.a->patch_curvature.max_radius +
                 pair.scale_b * pair.b->patch_curvature.max_radius),
         dented_(pair.a->dented() || pair.b->dented()) {}

@@ -40,7 +40,7 @@ double PolytopeSearch::cover(int v) {
   const double level = -lower_ - kCapDepth * tolerance_ - shrink_;
   if (joggle_ > 0 || hull_.points() == kHullVertices || !(level > tolerance_)) return 0;
   const auto [a, b] = bends_at(v, t, s);
-  const double y0 = d.dot(g), slope = (g - y0 * d).norm() + kRoundoff * pair_.reach,
+  const double y0 = d.dot(g), slope = (g - y0 * d).norm() + pair_.noise,
                over = std::max(0.0, w.p - shrink_ - y0) + roundoff();
   double angle = 0;
   for (double to = kWidestCap; to > kLeastCap; to *= kNextCap) {
@@ -115,7 +115,7 @@ bool PolytopeSearch::cover_by_cores(int v) {
   PolytopeSearch cores(*this, v, valid, share * cut_a, share * cut_b);
   const double angle = cores.prove(&there);
   queries_ += cores.queries_;
-  if (angle > 0) add_cap(v, there + cut, angle, (g - d.dot(g) * d).norm() + kRoundoff * pair_.reach);
+  if (angle > 0) add_cap(v, there + cut, angle, (g - d.dot(g) * d).norm() + pair_.noise);
   if (cores.lower_ > lower_) {  // a lower minimum
     const int lower = query(cores.direction_, v);
     if (lower >= 0) hull_.grow(lower, least_height());

@@ -96,7 +96,7 @@ class PolytopeSearch {
   // directions within `valid` of it.
   PolytopeSearch(const PolytopeSearch& whole, int from, double valid, double shrink_a, double shrink_b);
 
-  double roundoff() const { return kRoundoff * pair_.reach + 2 * joggle_ + error_; }
+  double roundoff() const { return pair_.noise + 2 * joggle_ + error_; }
   // A point less high above a face than this is not worth adding: the bracket is as good as closed there.
   double least_height() const { return std::max(0.25 * roundoff(), kLeastHeight * tolerance_); }
   static HullPoints hull_points(const Shape& shape, double scale, double tolerance);

@@ -34,12 +34,11 @@ RingSectors::RingSectors(const PairFrame& pair, bool k_is_a, bool core, double t
     : pair_(pair), view_(pair, k_is_a, core, tolerance, arcs), tolerance_(tolerance) {
   tangent_ = arcs ? Vec3(view_.turn_k * arcs->start) : view_.axis.unitOrthogonal();
   second_ = view_.axis.cross(tangent_);
-  noise_ =
-      2 * kRoundoff * (view_.scale_k * view_.k->bounding_radius + view_.scale_m * view_.m->bounding_radius) +
-      view_.scale_k * (arcs           ? arcs->error
-                       : view_.near_k ? 0.0
-                                      : view_.k->revolution.error + view_.k->meridian.error) +
-      (view_.circles ? view_.scale_m * view_.mate_error : 0.0) + view_.error;
+  noise_ = 2 * (pair.noise + kRoundoff * pair.size) +
+           view_.scale_k * (arcs           ? arcs->error
+                            : view_.near_k ? 0.0
+                                           : view_.k->revolution.error + view_.k->meridian.error) +
+           (view_.circles ? view_.scale_m * view_.mate_error : 0.0) + view_.error;
 }
 
 bool RingSectors::run(bool last, double* left, PolytopeResult* result) {

@@ -40,7 +40,7 @@ class Rings {
     const double both = balls.sum(), share = both > m.level ? m.level / both : 1;
     radius_a_ = share * balls.radius_a;
     radius_b_ = share * balls.radius_b;
-    level_ = std::max(0.0, m.level - radius_a_ - radius_b_) + 8 * kRoundoff * pair.reach;
+    level_ = std::max(0.0, m.level - radius_a_ - radius_b_) + 8 * pair.noise;
     const Mat2 turn = m.turn - (radius_a_ + radius_b_) * Mat2::Identity();
     bend_ = extremes(turn);
     const Vec2 axis = least_axis(turn, bend_.least);

@@ -1,0 +1,104 @@
+// Joints that count as smooth but are kinked by less than kNoKink: what they take from balls inside a body.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <vector>
+
+#include "body/small_kinks.h"
+#include "body/support.h"
+#include "contact/pair_search.h"
+#include "shapes/revolved.h"
+#include "support/least_overlap.h"
+#include "support/pairs.h"
+#include "support/random.h"
+
+namespace nurbs {
+namespace {
+
+using test::Random;
+using Body = std::shared_ptr<const Shape>;
+
+// What two unit balls have in common whose centres are 2 apart on the axis: exact parts of balls, which meet
+// in a kink of twice that angle.
+Body common_of_balls(double apart) {
+  const double turn = 0.5 * M_PI - std::asin(apart), rim = std::cos(std::asin(apart)),
+               corner = std::tan(0.5 * turn), weight = std::cos(0.5 * turn);
+  return make_shape("common", revolve({{Vec2(0, apart - 1), Vec2(corner, apart - 1), Vec2(rim, 0), weight},
+                                       {Vec2(rim, 0), Vec2(corner, 1 - apart), Vec2(0, 1 - apart), weight}}));
+}
+
+double support(const Shape& shape, const Vec3& d) {
+  return find_hull_support(shape, d, nullptr, 1e-15, 1e-15).upper;
+}
+
+TEST(SmallKinks, balls_that_have_given_way_stay_inside) {
+  for (const double r : {0.1, 1.0, 7.0})
+    for (const double kink : {1e-15, 1e-11, 1e-9, 2e-8, 1e-7}) {
+      std::vector<std::array<EdgeLink, 4>> links(1);
+      for (EdgeLink& link : links[0]) link.kink = link.kink_bound = kink;
+      const SmallKinks small = find_small_kinks(links, 1);
+      const double inside = small.inside(r), slack = small.slack + 4e-16;
+      EXPECT_LE(inside, r);
+      EXPECT_GE(small.outside(r), r);
+      EXPECT_LE(slack, 1e-12);
+      if (kink <= 1e-9) {
+        EXPECT_GT(inside, r * (1 - 0.02 * r));
+      }
+      // A corner whose fan is four kinks wide, and beside it a ball of radius r.
+      for (double t = 1e-9; t < 1.5; t *= 1.3) {
+        const double beyond = std::max(0.0, t - 4 * kink), half = std::sin(0.5 * t),
+                     rest = std::sin(0.5 * beyond);
+        EXPECT_GE(2 * r * rest * rest, 2 * inside * half * half - slack) << r << " " << kink << " " << t;
+      }
+    }
+}
+
+// The radius of the two balls was taken for one that rolls all through the body, kinks up to 1e-7 for none:
+// depths came out too large by the kink times the radius, closed.
+TEST(SmallKinks, common_parts_of_two_balls_are_not_their_hull) {
+  Random random(5);
+  const std::vector<Vec3> many = test::spiral(400);
+  for (const double apart : {4e-8, 1e-8, 1e-9, 1e-11}) {
+    const Body body = common_of_balls(apart);
+    ASSERT_NEAR(body->proofs.opening, 2 * apart, 1e-3 * apart + 1e-14);
+    ASSERT_FALSE(body->inner_map().nodes.empty());
+    for (int k = 0; k < 4000; ++k) {
+      const InnerNode& node = body->inner_map().nodes[random.below(body->atlas.nodes())];
+      const int cap = random.below(kInnerCaps.size());
+      const Vec3 t = node.normal.cross(random.direction()).normalized();
+      const double turn = random.uniform(0, kInnerCaps[cap]);
+      const Vec3 d = std::cos(turn) * node.normal + std::sin(turn) * t;
+      const double ball = d.dot(node.point) + node.radius[cap] * 0.5 * (d - node.normal).squaredNorm();
+      ASSERT_GE(support(*body, d), ball - body->small_kinks.slack - 1e-15) << apart;
+    }
+    if (body->core.found()) {
+      for (const Vec3& d : many)
+        EXPECT_NEAR(support(*body, d), d.dot(body->core.points[body->core.support(d)]) + body->core.radius,
+                    body->core.error + 1e-15);
+    }
+    int closed = 0;
+    for (int k = 0; k < 60; ++k) {
+      const Particle a{body.get(), 1, Vec3::Zero(), random.turn()};
+      const Vec3 way = k % 2 ? Vec3(a.q * Vec3::UnitZ()) : random.direction();
+      const double away = k % 3 ? random.log_uniform(1e-3, 1) : random.log_uniform(1e-8, 1e-3);
+      const Particle b{body.get(), 1, Vec3(away * way), k % 4 < 2 ? a.q : random.turn()};
+      double memory[kPairMemorySize] = {0};
+      ContactSettings settings;
+      settings.tolerance = 1e-9;
+      const ContactResult r = find_contact(a, b, settings, memory);
+      closed += r.status == Status::converged;
+      std::vector<Vec3> starts = many;
+      for (const Vec3& d : {r.normal, way, Vec3(-way)}) starts.push_back(d);
+      const double least = test::least_overlap(
+          [&](const Vec3& d) {
+            return support(*body, a.q.conjugate() * d) + support(*body, b.q.conjugate() * -d) - d.dot(b.x);
+          },
+          starts, test::Compass(), random);
+      EXPECT_LE(-r.upper, least + 1e-14) << apart << " pair " << k << ", away " << away;
+    }
+    EXPECT_GE(closed, 20) << apart;
+  }
+}
+
+}  // namespace
+}  // namespace nurbs
