@@ -584,7 +584,13 @@ void ContactStages::start_run(ContactBlock& block, int lane, const Results& resu
 // Ends the law's part of a contact that has opened since the last step.
 void ContactStages::close(ContactBlock& block, int lane) {
   if (block.field[kStateField][lane] == 0) return;
-  if (step_.model != nullptr) return finish_model(block, lane);
+  double& weight = block.field[kWeight][lane];
+  const double next = weight > 0 ? 1 : weight;  // when it begins again
+  if (step_.model != nullptr) {
+    finish_model(block, lane);
+    weight = next;
+    return;
+  }
   ContactState state;
   block.get(lane, kStateField, kContactStateSize, &state);
   const int a = block.a[lane], b = block.b[lane];
@@ -595,6 +601,7 @@ void ContactStages::close(ContactBlock& block, int lane) {
   }
   state = ContactState{};
   block.set(lane, kStateField, kContactStateSize, &state);
+  weight = next;
 }
 
 // Makes a contact a mere neighbour, proven `lower` apart.

@@ -396,10 +396,7 @@ void ContactStages::settle_left(ContactBlock& block, int lane, Results& results,
 void ContactStages::relax_weight(ContactBlock& block, int lane, double gap) {
   double& weight = block.field[kWeight][lane];
   if (weight == 1 || weight < 0) return;
-  if (block.field[kStateField][lane] == 0) {
-    weight = 1;
-    return;
-  }
+  if (block.field[kStateField][lane] == 0) return;  // it begins, with the weight that it was given
   ContactState state;
   block.get(lane, kStateField, kContactStateSize, &state);
   const ContactRest rest = rest_of(state, record(block.a[lane]), record(block.b[lane]));

@@ -120,6 +120,23 @@ class PulledAway(unittest.TestCase):
         np.testing.assert_allclose(mesh, body, atol=2e-2)
 
 
+class FreeEdge(unittest.TestCase):
+    def test_a_box_slides_off_with_its_energy(self):
+        """The last two points of its face end at once, and one corner of the mesh holds what they held."""
+        energy = """compute led all nurbs/energy
+compute ke all ke
+compute ro all erotate/nurbs
+variable sum equal c_ke+c_ro+mass(all)*9.81*z[1]+c_led[1]+c_led[2]+c_led[3]+c_led[4]
+thermo_style custom step c_st[8] v_z v_sum
+thermo_modify norm no format float %.15g
+velocity all set 2 0 0
+run 13000
+"""
+        r = run(ON_MESH.format(at="2 0.1 0.574", law="kn 1e6 kt 0 cn 0 mu 0") + energy).thermo
+        self.assertLess(r["z"][-1], -1)
+        self.assertLess(np.ptp(r["sum"]), 2)
+
+
 class ShortBox(unittest.TestCase):
     def test_a_new_image_is_no_old_contact(self):
         text = HEAD.format(boundary="p p p", region="-2.095 2.095 -4 4 -3 3", skin=0.3) + """
