@@ -13,6 +13,7 @@ namespace nurbs {
 namespace {
 
 constexpr int kMost = (kMaxDegree + 1) * (kMaxDegree + 1);
+constexpr int kBeforeTurning = 40;  // boxes looked at
 
 // A piece [u0, u1] x [v0, v1] of the patch with the coefficients of d . wx - h0 w and of w on it. A degree of
 // 0 means that the piece is an edge.
@@ -291,6 +292,44 @@ Bounds bounds_of(const Box& box, bool bicubic, const double* g) {
   return b;
 }
 
+// Second derivatives of a box, all as coefficients of the box's own degrees.
+struct Hessian {
+  double uu[kMost], uv[kMost], vv[kMost];
+};
+// Raises the degree of `rows` polynomials from n by one: `apart` between them, `stride` between the
+// coefficients of one.
+void elevate(double* c, int n, int stride, int rows, int apart) {
+  for (int r = 0; r < rows; ++r) {
+    double* x = c + r * apart;
+    x[(n + 1) * stride] = x[n * stride];
+    for (int i = n; i > 0; --i) {
+      const double share = i / (n + 1.0);
+      x[i * stride] = share * x[(i - 1) * stride] + (1 - share) * x[i * stride];
+    }
+  }
+}
+void second_derivatives(const double* g, int nu, int nv, Hessian* h) {
+  const int row = nv + 1;
+  for (int i = 0; i <= nu; ++i)
+    for (int j = 0; j <= nv; ++j) {
+      const double* c = g + i * row + j;
+      if (i + 1 < nu) h->uu[i * row + j] = nu * (nu - 1) * (c[2 * row] - 2 * c[row] + c[0]);
+      if (j + 1 < nv) h->vv[i * row + j] = nv * (nv - 1) * (c[2] - 2 * c[1] + c[0]);
+      if (i < nu && j < nv) h->uv[i * row + j] = nu * nv * (c[row + 1] - c[row] - c[1] + c[0]);
+    }
+  for (const int n : {nu - 2, nu - 1}) elevate(h->uu, n, row, nv + 1, 1);
+  for (const int n : {nv - 2, nv - 1}) elevate(h->vv, n, 1, nu + 1, row);
+  elevate(h->uv, nv - 1, 1, nu, row);
+  elevate(h->uv, nu - 1, row, nv + 1, 1);
+}
+
+// How a box's f is bent, at least, along parameters turned by an angle: what is concave.
+struct Bend {
+  double a = 0, c = 0;  // downwards, along the first and across
+  double share = 0;     // that the mixed term leaves; 0: nothing is proven
+  double cosine = 1, sine = 0;
+};
+
 class Search {
  public:
   Search(const BezierPatch& patch, const PatchPiece& piece, const Vec3& d, double slack, Highest* best)
@@ -309,6 +348,7 @@ class Search {
     double over = 0;  // of boxes given up, above h0
     int top = 1;
     for (int boxes = 0; top > 0; ++boxes) {
+      boxes_ = boxes;
       Box& box = stack_[top - 1];
       ++best_->boxes;
       const Next next = look_at(box);
@@ -456,16 +496,43 @@ class Search {
     *one_v = *one_v && same_way(b.gv, top.gv);
   }
 
+  // Along the Hessian's own axes in the middle: where the height falls by less and less along a line that
+  // crosses the parameters, as from a corner that is straight, only there the mixed term is small.
+  static Bend turned_bend(const Box& box, const double* g) {
+    Hessian h;
+    second_derivatives(g, box.nu, box.nv, &h);
+    const int n = (box.nu + 1) * (box.nv + 1);
+    double uu = 0, uv = 0, vv = 0;
+    for (int k = 0; k < n; ++k) uu += h.uu[k], uv += h.uv[k], vv += h.vv[k];
+    const double angle = 0.5 * std::atan2(2 * uv, uu - vv);
+    Bend bend;
+    bend.cosine = std::cos(angle);
+    bend.sine = std::sin(angle);
+    const double cc = bend.cosine * bend.cosine, ss = bend.sine * bend.sine, cs = bend.cosine * bend.sine;
+    double mixed = 0;
+    bend.a = bend.c = kFarAway;
+    for (int k = 0; k < n; ++k) {
+      bend.a = std::min(bend.a, -(cc * h.uu[k] + 2 * cs * h.uv[k] + ss * h.vv[k]));
+      bend.c = std::min(bend.c, -(ss * h.uu[k] - 2 * cs * h.uv[k] + cc * h.vv[k]));
+      mixed = std::max(mixed, std::abs(cs * (h.vv[k] - h.uu[k]) + (cc - ss) * h.uv[k]));
+    }
+    if (bend.a > 0 && bend.c > 0) bend.share = 1 - mixed / std::sqrt(bend.a * bend.c);
+    return bend;
+  }
+
   // Whether g is concave on the box and, from the gradient at its maximum there, proven not to be positive.
   // May instead raise best, which lowers g.
   bool concave(const Box& box, bool bicubic, const double* g, const Bounds& b) {
     const bool u = box.nu > 0, v = box.nv > 0;
-    const double a = u ? -box.nu * (box.nu - 1) * b.guu.high : 1,
-                 c = v ? -box.nv * (box.nv - 1) * b.gvv.high : 1;
-    if (!(a > 0 && c > 0)) return false;
-    double share = 1;  // of the diagonal that the mixed term leaves
-    if (u && v) share -= box.nu * box.nv * b.guv.magnitude() / std::sqrt(a * c);
-    if (!(share > kConcaveShare)) return false;
+    Bend bend;
+    bend.a = u ? -box.nu * (box.nu - 1) * b.guu.high : 1;
+    bend.c = v ? -box.nv * (box.nv - 1) * b.gvv.high : 1;
+    if (!(bend.a > 0 && bend.c > 0)) return false;
+    bend.share = 1;
+    if (u && v) bend.share -= box.nu * box.nv * b.guv.magnitude() / std::sqrt(bend.a * bend.c);
+    if (!(bend.share > kConcaveShare) && boxes_ > kBeforeTurning && box.nu > 1 && box.nv > 1)
+      bend = turned_bend(box, g);
+    if (!(bend.share > kConcaveShare)) return false;
     const double width_u = box.u1 - box.u0, width_v = box.v1 - box.v0;
     double s = 0.5, t = 0.5;
     const SurfacePoint& at = best_->where;
@@ -479,7 +546,8 @@ class Search {
       const bool at_u = !u || (s <= 0 && x.fu < 0) || (s >= 1 && x.fu > 0);
       const bool at_v = !v || (t <= 0 && x.fv < 0) || (t >= 1 && x.fv > 0);
       const double gu = at_u ? 0 : x.fu, gv = at_v ? 0 : x.fv;
-      const double rest = 0.5 * (gu * gu / a + gv * gv / c) / share;
+      const double along = bend.cosine * gu + bend.sine * gv, across = bend.cosine * gv - bend.sine * gu;
+      const double rest = 0.5 * (along * along / bend.a + across * across / bend.c) / bend.share;
       if (x.f + rest <= 0) return true;
       const double weight = box.rational ? evaluate_net(box.w, box.nu, box.nv, s, t).f : 1;
       double s_next = s, t_next = t;
@@ -509,6 +577,7 @@ class Search {
   Highest* best_;
   double level_ = 0;  // of the coefficients last taken
   bool edges_along_u_ = false;
+  int boxes_ = 0;
   Box stack_[kMaximumDepth + 2];  // left uninitialised
 };
 

@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "body/patch_maximum.h"
 #include "body/support.h"
 #include "contact/pair_search.h"
 #include "io/pair_case.h"
@@ -538,6 +539,37 @@ TEST(SavedCases, poles_that_are_scraps) {
           << name << " " << tolerance;
     }
   }
+}
+
+// Where a patch's corner is straight, the height along its normal falls as a fourth power along a line that
+// crosses the parameters: the search over patches ran out of boxes, and this pair took 0.25 s and stayed
+// open.
+TEST(SavedCases, corners_that_are_straight) {
+  const PairCase pair = read_pair_case("tests/cases/straight-corners.json");
+  double memory[kPairMemorySize] = {0};
+  const ContactResult r = find_contact(pair.a, pair.b, pair.settings, memory);
+  EXPECT_EQ(r.status, Status::converged);
+  EXPECT_NEAR(r.gap, 8.6134587518e-07, 1e-13);
+  int straight = 0;
+  for (const auto& shape : {pair.shape_a, pair.shape_b})
+    for (size_t k = 0; k < shape->patches.size(); ++k)
+      for (const double u : {0.0, 1.0})
+        for (const double v : {0.0, 1.0}) {
+          const Jet2 j = evaluate2(shape->patches[k], u, v);
+          if (!(j.su.cross(j.sv).norm() < 1e-9 * j.su.norm() * j.sv.norm()) || !(j.su.dot(j.sv) < 0))
+            continue;
+          ++straight;
+          // Between the sides: the surface leaves its tangent plane by second derivatives only.
+          const double a = j.sv.norm(), b = j.su.norm();
+          const Vec3 inward = a * a * j.suu + 2 * a * b * (u == v ? 1 : -1) * j.suv + b * b * j.svv;
+          Vec3 d = j.su.cross(inward).normalized();
+          if (d.dot(j.s) < 0) d = -d;
+          Highest best{{static_cast<int>(k), u, v}, d.dot(j.s), -1e300, 0};
+          raise(shape->patches[k], {static_cast<int>(k)}, d, 1e-11 * shape->bounding_radius, &best);
+          EXPECT_LT(best.boxes, 1000) << k << " " << u << " " << v;
+          EXPECT_LE(best.upper, best.h + 2e-11 * shape->bounding_radius) << k << " " << u << " " << v;
+        }
+  EXPECT_GT(straight, 0);
 }
 
 // Tip on tip the least overlap is nearly the same all round the axis; of few digits, which keep the bodies
