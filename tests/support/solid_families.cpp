@@ -308,6 +308,30 @@ PairCase few_digits(Random& random, long) {
   return c;
 }
 
+// What two balls have in common whose centres are hardly apart, and images of it: joints with kinks that
+// count as none.
+const std::vector<Solid>& kinked_slightly() {
+  static const std::vector<Solid> all = [] {
+    Random random(1013);
+    std::vector<Solid> made;
+    for (int k = 0; k < 12; ++k) {
+      Solid solid = test::slight_lens(random, random.log_uniform(1e-11, 1e-7));
+      if (k % 3 == 2) solid = test::stretched(random, solid, random.uniform(0.3, 0.9));
+      made.push_back(solid);
+    }
+    return made;
+  }();
+  return all;
+}
+
+PairCase slight_kinks(Random& random, long) {
+  const auto& bodies = kinked_slightly();
+  const auto any = [&]() -> const Solid& { return bodies[random.below(static_cast<int>(bodies.size()))]; };
+  const Solid &a = any(), &b = random.below(2) ? any() : partner(Kind::lens, random);
+  return place(random, a, b, random.below(3) ? random.uniform(0.3, 3) : 1.0, 1e-9,
+               random.below(4) ? 1e-2 : 0.5);
+}
+
 }  // namespace
 
 const std::vector<Solid>& solids_of(Kind kind) {
@@ -340,6 +364,8 @@ const std::vector<Family>& solid_families() {
        kPairs, needle_pair},
       {"few digits", "all these, control points to 12 to 14 decimals, on one axis and anyhow", kPairs,
        few_digits},
+      {"slight kinks", "two balls' common parts and images of them, kinks of 1e-11 to 1e-7 rad, and lenses",
+       kPairs, slight_kinks},
   };
   return all;
 }

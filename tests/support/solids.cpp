@@ -142,18 +142,30 @@ Solid capsule(Random& random, double r, double half) {
   return turned_solid(random, "capsule", {revolve(profile, 2)}, support, {});
 }
 
-Solid lens(Random& random, double bend) {
-  const double low = std::sqrt(bend * bend - 1);  // centre of a cap's sphere below the crease
-  const double half = 0.5 * std::asin(1 / bend);  // half of the cap's angle from its pole to the crease
+namespace {
+
+// `low`: centre of a cap's sphere below the crease.
+Solid lens_of(Random& random, double low) {
+  const double bend = std::hypot(1, low);
+  const double half = 0.5 * std::atan2(1, low);  // half of the cap's angle from its pole to the crease
   const double top = bend - low, reach = bend * std::tan(half), w = std::cos(half);
   const Profile profile = {{0, -top, 1}, {reach, -top, w}, {1, 0, 1}, {reach, top, w}, {0, top, 1}};
   const auto support = [=](const Vec3& d) -> Vec3 {
     const Vec3 n = d.normalized();
     const double across = std::hypot(n[0], n[1]);
-    if (bend * across < 1) return bend * n - (n[2] > 0 ? low : -low) * Vec3::UnitZ();
+    if (bend * std::abs(n[2]) > low) return bend * n - (n[2] > 0 ? low : -low) * Vec3::UnitZ();
     return Vec3(n[0] / across, n[1] / across, 0);
   };
   return turned_solid(random, "lens", {revolve(profile, 2)}, support, poles());
+}
+
+}  // namespace
+
+Solid lens(Random& random, double bend) {
+  return lens_of(random, std::sqrt(bend * bend - 1));
+}
+Solid slight_lens(Random& random, double kink) {
+  return lens_of(random, std::tan(0.5 * kink));
 }
 
 Solid spherical_segment(Random& random, double low, double high) {

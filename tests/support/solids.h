@@ -48,6 +48,8 @@ Solid frustum(Random& random, double low, double high, double height, double wei
 Solid capsule(Random& random, double radius, double half_length);
 // Two spherical caps of radius `bend` that meet at a crease of radius 1; bend > 1.
 Solid lens(Random& random, double bend);
+// The same, all but a ball, whose crease is `kink` rad.
+Solid slight_lens(Random& random, double kink);
 // What planes square to z leave of the unit sphere between `low` and `high`, both in [-1, 1].
 Solid spherical_segment(Random& random, double low, double high);
 // Two conics, of rational quadratics whose corners weigh `weight`, from poles at -below and above to a circle
