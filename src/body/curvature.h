@@ -21,8 +21,8 @@ struct SurfaceSample {
 std::vector<SurfaceSample> sample_surface(const std::vector<BezierPatch>& patches);
 
 // The strict bounds of the whole body's convex hull: an opening kink is a crease (radius 0), a closing one is
-// bridged by a flat strip (infinite radius). Kinks up to kNoKink count as none. Imperfect joints therefore
-// give (0, infinity).
+// bridged by a flat strip (infinite radius). Kinks up to kNoKink are no creases (small_kinks.h). Imperfect
+// joints therefore give (0, infinity).
 CurvatureBounds add_kinks(const CurvatureBounds& patches, const KinkSummary& kinks);
 
 }  // namespace nurbs

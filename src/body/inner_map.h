@@ -27,8 +27,8 @@ constexpr int kStretchCells = 32;  // per cube edge
 // h'' + h >= radius[k] along great circles there (in the sense of measures: where a flat or a groove adds to
 // it, it adds what is positive), so that from `normal` on
 //     h(d) >= d.point + radius[k] (1 - d.normal)   for unit d within kInnerCaps[k] of it.
-// Hypotheses: the body's joints meet, `point` is the support there; but for what small kinks rise
-// (SmallKinks:: slack), which the radii have given way to. Of a dented body the same holds of its convex
+// Hypotheses: the body's joints meet, `point` is the support there; but for the slack of
+// small kinks (small_kinks.h). Of a dented body the same holds of its convex
 // hull, with W of the surface's own points: a support of the hull is a point of the surface where the normal
 // is d and no curvature is more than 1 / radius, so that the surface around it lies above a ball of that
 // radius that touches there, and h, which is no less than that ball's, bends from d by its radius at least.

@@ -54,7 +54,7 @@ JointDistance measure_joint_distance(const Shape& shape);
 //
 // Without kinks the radii are r0 and P0: Blaschke's rolling theorem, whose hypotheses are a closed convex
 // surface with continuous normals and all curvature radii in [r0, P0]. Normals that jump by up to kNoKink
-// move it by the square of that.
+// have been taken off the radii (small_kinks.h), but for a slack that brackets count.
 //
 // With kinks, a ball of radius r that touches at x lies in the body K if K's surface over the disc of radius
 // r of the tangent plane at x is above it, and r <= t I / (t + O) for some t >= r such that it covers the

@@ -24,8 +24,8 @@ constexpr double kPoleInset = 1e-4;      // parameters from a pole at which its 
 constexpr double kLeastVolume = 1e-12;   // of the diagonal cubed: less is no body but a surface
 
 // --- joints
-constexpr double kNoKink = 1e-7;      // angles between normals below this are no kink: the ball argument then
-                                      // errs by less than kink^2 of the radius, which is round-off
+constexpr double kNoKink = 1e-7;  // angles between normals below this are no kink, but take from the radii
+                                  // of balls inside and around: body/small_kinks.h
 constexpr double kSmoothKink = 1e-6;  // such bodies count as smooth: ignoring a kink moves a support by
                                       // kink^2/8, 1e-13 of the radius
 constexpr double kSphere =
