@@ -540,7 +540,7 @@ double ContactStages::same_place(int a, int b, const Vec3& apart) const {
 bool ContactStages::is_where_left(int a, const ContactGeometry& geometry, double same,
                                   ContactState* state) const {
   if (a == -1) follow_wrap(geometry, same, state);
-  return state->dt > 0 && same_geometry(*state, geometry, same);
+  return same_geometry(*state, geometry, same);
 }
 
 // The state stays as it is when the bodies are where it was made, so that a run in two parts moves as one;
@@ -553,7 +553,7 @@ void ContactStages::start_run(ContactBlock& block, int lane, const Results& resu
   if (results.touching[lane] != 0) {
     block.get(lane, kStateField, kContactStateSize, &state);
     const bool same = is_where_left(a, geometry, same_place(a, b, results.offset_of(lane)), &state);
-    const bool stays = same && !step_.changed;
+    const bool stays = same && state.dt > 0 && !step_.changed;
     if (step_.model != nullptr) {
       if (stays)
         load_model(block, lane, state);

@@ -104,6 +104,55 @@ thermo 10
         self.assertLess(there[-1], -0.5)
         np.testing.assert_allclose(moved, there, atol=5e-3)
 
+    def test_empty_runs_change_nothing(self):
+        """Capsules in a heap, lying on each other and in corners; velocities are set, and contacts begin anew."""
+        text = """
+units si
+newton off
+communicate single vel yes
+soft_particles yes
+atom_style nurbs capsule.json
+boundary f f f
+region box block -0.03 0.03 -0.03 0.03 -0.01 0.1 units box
+create_box 1 box
+lattice sc 0.0065
+region in block -0.015 0.015 -0.015 0.015 0.004 0.02 units box
+create_atoms 1 region in
+set group all density 2500
+set group all nurbs/scale 2.5e-3
+set group all quat/random 86028121
+neighbor 1e-3 bin
+neigh_modify delay 0
+fix E all property/global youngsModulus peratomtype 2e6
+fix nu all property/global poissonsRatio peratomtype 0.3
+fix e all property/global coefficientRestitution peratomtypepair 1 0.5
+fix mu all property/global coefficientFriction peratomtypepair 1 0.5
+pair_style gran/nurbs model hertz tangential history
+pair_coeff * *
+"""
+        for k, plane in enumerate(("0 0 0 0 0 1", "-0.02 0 0 1 0 0", "0.02 0 0 -1 0 0", "0 -0.02 0 0 1 0", "0 0.02 0 0 -1 0")):
+            text += f"fix w{k} all wall/nurbs plane {plane} type 1 model hertz tangential history\n"
+        text += """
+fix gravity all gravity 9.81 vector 0 0 -1
+fix motion all nve/nurbs
+timestep 2.5e-5
+compute ledger all nurbs/energy
+compute st all nurbs/stats
+thermo_style custom step c_ledger[1] c_ledger[2] f_w0[3] c_st[8]
+thermo_modify norm no format float %.15g
+thermo 4000
+run 4000
+set atom 1 vx 0.0
+run 0
+run 0
+run 0
+"""
+        r = deck.run_ok(text, files={"capsule.json": deck.ROOT / "examples/shapes/capsule.json"})
+        self.assertGreater(r.tables[0]["st[8]"][-1], 50)
+        self.assertEqual(r.tables[0]["ledger[1]"][-1], r.thermo["ledger[1]"][-1])
+        for name in ("ledger[1]", "ledger[2]", "w0[3]", "st[8]"):
+            self.assertEqual(r.tables[1][name][-1], r.thermo[name][-1], name)
+
     def test_a_run_in_two_parts_is_one(self):
         half = ON_MESH.format(at="0.3 0.2 0.61", law=LAW)
         whole, parts = run(half + "run 4000").thermo, run(half + "run 2000\nrun 2000").thermo
