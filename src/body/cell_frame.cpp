@@ -9,6 +9,11 @@ namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
+Section section(const Cell& c, bool in_v, bool backwards) {
+  const double low = in_v ? c.v0 : c.u0, high = low + (in_v ? c.dv : c.du);
+  return backwards ? Section{1 - high, 1 - low} : Section{low, high};
+}
+
 }  // namespace
 
 const Vec4& turned_point(const BezierPatch& patch, int pole, int i, int j) {
@@ -40,30 +45,10 @@ double from_pole(const Cell& c) {
 }
 
 Section rows_of(const Cell& c) {
-  const double u1 = c.u0 + c.du, v1 = c.v0 + c.dv;
-  switch (c.pole) {
-    case 1:
-      return {1 - u1, 1 - c.u0};
-    case 2:
-      return {c.v0, v1};
-    case 3:
-      return {1 - v1, 1 - c.v0};
-    default:
-      return {c.u0, u1};
-  }
+  return section(c, c.pole >= 2, c.pole == 1 || c.pole == 3);
 }
 Section columns_of(const Cell& c) {
-  const double u1 = c.u0 + c.du, v1 = c.v0 + c.dv;
-  switch (c.pole) {
-    case 1:
-      return {1 - v1, 1 - c.v0};
-    case 2:
-      return {1 - u1, 1 - c.u0};
-    case 3:
-      return {c.u0, u1};
-    default:
-      return {c.v0, v1};
-  }
+  return section(c, c.pole < 2, c.pole == 1 || c.pole == 2);
 }
 
 bool make_frame(const BezierPatch& patch, const Cell& cell, const Vec3& origin, bool upright, Frame* frame) {

@@ -45,14 +45,14 @@ NearRevolution find_near_revolution(const std::vector<BezierPatch>& patches, con
   return near;
 }
 
-// The body has the product's points but for the ripple, so that its support is no less than that at the
-// product's place for d, which is where the profile bends by no less than the radius (but within kinks, which
-// take a share of what it rises by), less what the ripple changes by from the places given: those for
-// directions within reach lie between the outermost two.
 const Revolution& revolution_of(const Shape& shape) {
   return shape.revolution.found ? shape.revolution : shape.near_revolution.revolution;
 }
 
+// The body has the product's points but for the ripple, so that its support is no less than that at the
+// product's place for d, which is where the profile bends by no less than the radius (but within kinks, which
+// take a share of what it rises by), less what the ripple changes by from the places given: those for
+// directions within reach lie between the outermost two.
 ProfileBall ball_within(const NearRevolution& near, const Vec3& own, double reach, const Meridian::Place& one,
                         const Meridian::Place& two, double size) {
   const Vec3 axis = near.revolution.axis;

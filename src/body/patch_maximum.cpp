@@ -347,8 +347,7 @@ class Search {
     set_root(&root);
     double over = 0;  // of boxes given up, above h0
     int top = 1;
-    for (int boxes = 0; top > 0; ++boxes) {
-      boxes_ = boxes;
+    for (; top > 0; ++boxes_) {
       Box& box = stack_[top - 1];
       ++best_->boxes;
       const Next next = look_at(box);
@@ -356,7 +355,7 @@ class Search {
         --top;
         continue;
       }
-      if (boxes >= kMaximumBoxes || top + 1 > kMaximumDepth) {
+      if (boxes_ >= kMaximumBoxes || top + 1 > kMaximumDepth) {
         over = std::max(over, highest_coefficient(box));
         --top;
         continue;
@@ -499,7 +498,7 @@ class Search {
   // Along the Hessian's own axes in the middle: where the height falls by less and less along a line that
   // crosses the parameters, as from a corner that is straight, only there the mixed term is small.
   static Bend turned_bend(const Box& box, const double* g) {
-    Hessian h;
+    Hessian h{};
     second_derivatives(g, box.nu, box.nv, &h);
     const int n = (box.nu + 1) * (box.nv + 1);
     double uu = 0, uv = 0, vv = 0;
@@ -577,7 +576,7 @@ class Search {
   Highest* best_;
   double level_ = 0;  // of the coefficients last taken
   bool edges_along_u_ = false;
-  int boxes_ = 0;
+  int boxes_ = 0;                 // looked at
   Box stack_[kMaximumDepth + 2];  // left uninitialised
 };
 

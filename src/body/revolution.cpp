@@ -6,6 +6,7 @@
 #include <cmath>
 #include <limits>
 
+#include "body/mass_properties.h"
 #include "nurbs/bernstein.h"
 #include "nurbs/tolerances.h"
 
@@ -141,12 +142,12 @@ bool guess_axis(const std::vector<BezierPatch>& patches, bool arcs_in_u, Revolut
 // one; none where all three are.
 constexpr double kAlikeMoments = 1e-4;  // of the largest
 bool guess_axis(const Mat3& inertia, Revolution* r) {
-  const Eigen::SelfAdjointEigenSolver<Mat3> principal(inertia);
-  const Vec3& m = principal.eigenvalues();  // ascending
+  const PrincipalFrame principal = principal_frame(inertia);
+  const Vec3& m = principal.moments;  // ascending
   const double alike = kAlikeMoments * m[2];
   const bool low = m[1] - m[0] <= alike, high = m[2] - m[1] <= alike;
   if (low == high) return false;
-  r->axis = principal.eigenvectors().col(low ? 2 : 0);
+  r->axis = principal.axes * Vec3::Unit(low ? 2 : 0);
   return true;
 }
 

@@ -36,6 +36,18 @@ Number lost_area2(const Number& speed2, const Number& size) {
   return kLost * kLost * size * size * speed2;
 }
 
+// |d - n|^2 at most, where n may be off by `noise` rad.
+template <class Number>
+Number widened_chord2(const Number& chord2, const Number& noise) {
+  return chord2 + noise * (2.0 * root(chord2) + noise);
+}
+// By how much a ball of radius rho that touches along n instead may seem nearer, its centre being off by rho
+// noise to the side; `chord` is |d - n|, and the balls' centres are `distance` apart.
+template <class Number>
+Number ball_beside(const Number& rho, const Number& noise, const Number& chord, const Number& distance) {
+  return rho * noise * (chord + noise * (1.0 + rho / distance));
+}
+
 // By how much the overlap along the normal that Newton's last step makes may be off, a length, where the
 // bracket's normals were off by an angle of this square: the new one errs by some kTurnRate times that, which
 // counts squared, by the larger body's reach. Of bodies of like sizes closed brackets see to it.
@@ -58,7 +70,7 @@ struct Bracket {
 inline double support_excess(const Shape& shape, double scale, const RollingRadii& radii, const Vec3& d,
                              const Vec3& n, double noise = 0) {
   double chord2 = (d - n).squaredNorm();  // 2 (1 - cos), without cancellation
-  if (noise > 0) chord2 += noise * (2 * std::sqrt(chord2) + noise);
+  if (noise > 0) chord2 = widened_chord2(chord2, noise);
   if (chord2 <= kNormalMargin * kNormalMargin && radii.near < kFarAway)
     return 0.5 * scale * radii.near * chord2;
   return scale * (rolling_excess(radii.outer, shape.bounding_radius, chord2) + radii.slack);
@@ -95,12 +107,11 @@ inline Bracket certify(const PairFrame& pair, const PointPair& p, double noise_a
   };
   bracket.dented = dented(*pair.a, radii_a) || dented(*pair.b, radii_b);
   const double slack = pair.scale_a * pair.a->joint_slack + pair.scale_b * pair.b->joint_slack;
-  // A ball that touches along a normal a little off: its centre, by rho noise to the side.
   const auto beside = [&](double rho, double noise, const Vec3& out) {
-    return noise > 0 ? rho * noise * ((d - out).norm() + noise * (1 + rho / distance)) : 0;
+    return noise > 0 ? ball_beside(rho, std::min(noise, 1.0), (d - out).norm(), distance) : 0;
   };
-  bracket.upper = distance - rho_a - rho_b + slack + roundoff + beside(rho_a, std::min(noise_a, 1.0), p.na) +
-                  beside(rho_b, std::min(noise_b, 1.0), -p.nb);
+  bracket.upper = distance - rho_a - rho_b + slack + roundoff + beside(rho_a, noise_a, p.na) +
+                  beside(rho_b, noise_b, -p.nb);
   bracket.lower = d.dot(p.b - p.a) - support_excess(*pair.a, pair.scale_a, radii_a, d, p.na, noise_a) -
                   support_excess(*pair.b, pair.scale_b, radii_b, -d, p.nb, noise_b) - roundoff;
   if (!(d.squaredNorm() > 0)) bracket.lower = -kFarAway;

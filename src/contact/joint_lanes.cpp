@@ -96,7 +96,7 @@ NURBS_INLINE Sides look(unsigned open, const Shape* const (&shape)[kWidth], cons
 // Excess of h(d) over d . (surface point), |d - n|^2 = least2, but for the normal's noise; of a body with
 // this bounding radius.
 NURBS_INLINE Wide excess(const Sides& side, const Wide& radius, const Wide& least2, bool any_noise) {
-  const Wide chord2 = any_noise ? Wide(least2 + side.noise * (2.0 * root(least2) + side.noise)) : least2;
+  const Wide chord2 = any_noise ? widened_chord2(least2, side.noise) : least2;
   const Wide rolling = 0.5 * side.outer * chord2, wedge = 2.0 * radius * root(chord2);
   return select((chord2 <= kNormalMargin * kNormalMargin) & (side.near < kFarAway), 0.5 * side.near * chord2,
                 smaller(rolling, wedge) + side.slack);
@@ -121,11 +121,9 @@ NURBS_INLINE BracketLanes certify(const JointLanes& pairs, const Sides& a, const
   out.angle2 = larger(chord2_a, chord2_b);
   out.unique = rho_a + rho_b;
   out.upper = distance - rho_a - rho_b + joint_slack + noise;
-  // A ball that touches along a normal a little off.
-  const auto beside = [&](const Wide& rho, const Wide& off, const Wide& chord2) -> Wide {
-    return rho * off * (root(chord2) + off * (1.0 + rho / distance));
-  };
-  if (any_noise) out.upper += beside(rho_a, a.noise, chord2_a) + beside(rho_b, b.noise, chord2_b);
+  if (any_noise)
+    out.upper += ball_beside<Wide>(rho_a, a.noise, root(chord2_a), distance) +
+                 ball_beside<Wide>(rho_b, b.noise, root(chord2_b), distance);
   out.lower = dot(out.direction, between) - excess(a, radius_a, chord2_a, any_noise) -
               excess(b, radius_b, chord2_b, any_noise) - noise;
   return out;

@@ -7,25 +7,15 @@
 #include "body/small_kinks.h"
 #include "body/support.h"
 #include "contact/pair_search.h"
-#include "shapes/revolved.h"
 #include "support/least_overlap.h"
 #include "support/pairs.h"
 #include "support/random.h"
+#include "support/solids.h"
 
 namespace nurbs {
 namespace {
 
 using test::Random;
-using Body = std::shared_ptr<const Shape>;
-
-// What two unit balls have in common whose centres are 2 apart on the axis: exact parts of balls, which meet
-// in a kink of twice that angle.
-Body common_of_balls(double apart) {
-  const double turn = 0.5 * M_PI - std::asin(apart), rim = std::cos(std::asin(apart)),
-               corner = std::tan(0.5 * turn), weight = std::cos(0.5 * turn);
-  return make_shape("common", revolve({{Vec2(0, apart - 1), Vec2(corner, apart - 1), Vec2(rim, 0), weight},
-                                       {Vec2(rim, 0), Vec2(corner, 1 - apart), Vec2(0, 1 - apart), weight}}));
-}
 
 double support(const Shape& shape, const Vec3& d) {
   return find_hull_support(shape, d, nullptr, 1e-15, 1e-15).upper;
@@ -59,7 +49,8 @@ TEST(SmallKinks, common_parts_of_two_balls_are_not_their_hull) {
   Random random(5);
   const std::vector<Vec3> many = test::spiral(400);
   for (const double apart : {4e-8, 1e-8, 1e-9, 1e-11}) {
-    const Body body = common_of_balls(apart);
+    const test::Solid solid = test::slight_lens(random, 2 * apart);  // balls `apart` from its middle
+    const auto& body = solid.shape;
     ASSERT_NEAR(body->proofs.opening, 2 * apart, 1e-3 * apart + 1e-14);
     ASSERT_FALSE(body->inner_map().nodes.empty());
     for (int k = 0; k < 4000; ++k) {
@@ -79,7 +70,7 @@ TEST(SmallKinks, common_parts_of_two_balls_are_not_their_hull) {
     int closed = 0;
     for (int k = 0; k < 60; ++k) {
       const Particle a{body.get(), 1, Vec3::Zero(), random.turn()};
-      const Vec3 way = k % 2 ? Vec3(a.q * Vec3::UnitZ()) : random.direction();
+      const Vec3 way = k % 2 ? Vec3(a.q * solid.normals[0]) : random.direction();
       const double away = k % 3 ? random.log_uniform(1e-3, 1) : random.log_uniform(1e-8, 1e-3);
       const Particle b{body.get(), 1, Vec3(away * way), k % 4 < 2 ? a.q : random.turn()};
       double memory[kPairMemorySize] = {0};

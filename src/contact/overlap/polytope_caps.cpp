@@ -10,7 +10,6 @@ namespace {
 constexpr double kCapDepth = 0.4;  // of the tolerance, that a cap proves less than the least overlap
 constexpr double kCapUsed = 0.8;   // of a cap's angle: the rest is for lower minima found later
 constexpr double kWidestCap = 0.42, kLeastCap = 1e-4, kNextCap = 0.75;  // rad
-constexpr double kOffNormal = 1e-6;                                     // rad, given away for round-off
 // A cap whose bodies are cut to their cores about it:
 constexpr double kOffSupport = 1e-4;  // rad
 constexpr double kSameBasin = 0.97;   // cosine
@@ -37,7 +36,7 @@ double PolytopeSearch::cover(int v) {
   if (points_) return 0;
   const Witness w = witness_[v];
   const Vec3 d = w.d, t = d.unitOrthogonal(), s = d.cross(t), g = hull_.point(v);
-  const double level = -lower_ - kCapDepth * tolerance_ - shrink_;
+  const double level = cap_level();
   if (joggle_ > 0 || hull_.points() == kHullVertices || !(level > tolerance_)) return 0;
   const auto [a, b] = bends_at(v, t, s);
   const double y0 = d.dot(g), slope = (g - y0 * d).norm() + pair_.noise,
@@ -92,7 +91,7 @@ bool PolytopeSearch::cover_by_cores(int v) {
   const Witness w = witness_[v];
   const Vec3 d = w.d, t = d.unitOrthogonal(), s = d.cross(t), g = hull_.point(v);
   const auto [a, b] = bends_at(v, t, s);
-  const double level = -lower_ - kCapDepth * tolerance_ - shrink_;
+  const double level = cap_level();
   Mat2 turn;
   Extremes seen{level, 4 * level};  // a guess, where there is a crease
   if (core_turn(v, d, t, s, &turn)) seen = extremes(turn);
@@ -165,7 +164,7 @@ double PolytopeSearch::prove(double* level) {
   surround(0, 0);
   const double narrow = std::cos(valid);
   while (hull_.points() < kCorePoints) {
-    *level = std::min(*level, -lower_ - kCapDepth * tolerance_ - shrink_);
+    *level = std::min(*level, cap_level());
     if (!(*level > least)) return 0;
     const int near = best_face();
     if (near < 0) return 0;
@@ -175,6 +174,10 @@ double PolytopeSearch::prove(double* level) {
     if (v < 0 || hull_.grow(v, least_height(), near) != GrowingHull::Growth::grown) return 0;
   }
   return 0;
+}
+
+double PolytopeSearch::cap_level() const {
+  return -lower_ - kCapDepth * tolerance_ - shrink_;
 }
 
 PolytopeSearch::Bends PolytopeSearch::bends_at(int v, const Vec3& t, const Vec3& s) const {
@@ -190,7 +193,7 @@ PolytopeSearch::Bends PolytopeSearch::bends_at(int v, const Vec3& t, const Vec3&
 // one. Where it is none of overlapping cores, the caps go: their points become their minima's own.
 void PolytopeSearch::lower_caps() {
   lower_caps_ = false;
-  const double level = -lower_ - kCapDepth * tolerance_ - shrink_;
+  const double level = cap_level();
   if (!(level > tolerance_)) drop_caps();
   for (int k = 0; k < caps_; ++k) {
     Cap& cap = cap_[k];

@@ -128,6 +128,8 @@ class PolytopeSearch {
   int closest_of(const GrowingHull::Face& f, const Vec3& d) const;
   Vec3 away_from(const GrowingHull::Face& f, const Vec3& closest) const;
 
+  // What caps prove of the cores: the least overlap seen, less a share of the tolerance.
+  double cap_level() const;
   double cover(int v);
   double add_cap(int v, double level, double angle, double slope);
   void cover_by_cores();

@@ -1,13 +1,6 @@
 #include "contact/overlap/turn_bound.h"
 
-#include "contact/certificate.h"
-
 namespace nurbs {
-namespace {
-
-constexpr double kOffNormal = 1e-6;  // rad, given away for round-off
-
-}  // namespace
 
 TurnBound bound_turn(const Shape& shape, double scale, const SurfacePoint& at, const Vec3& d, const Vec3& t,
                      const Vec3& s) {

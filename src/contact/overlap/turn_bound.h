@@ -8,6 +8,8 @@
 
 namespace nurbs {
 
+constexpr double kOffNormal = 1e-6;  // rad, given away for round-off of angles
+
 // From the support's own W and rate, and from the balls of the inner map; lengths of the lab.
 struct TurnBound {
   LocalBend local;
