@@ -397,6 +397,7 @@ KinkSummary measure_kinks(const std::vector<BezierPatch>& patches, PatchLinks& l
         link.kink_bound = std::min(M_PI, bound_pole_spread(patches[p], e));
         link.kink = link.kink_bound <= kNoKink ? 0 : pole_kink(patches[p], e);
         worst.convex = std::max(worst.convex, link.kink);
+        worst.pole_gap = std::max(worst.pole_gap, link.gap);
       } else {
         link.gap = bound_joint_gap(patches[p], e, patches[link.patch], link);
         const KinkBounds bounds = bound_kink(patches[p], e, patches[link.patch], link);

@@ -84,7 +84,8 @@ struct KinkSummary {
   double depth = 0;                // of the deepest groove that the convex hull bridges at a concave kink
   SurfacePoint deepest;            // where that is
   double excess = 0;               // how far one side of such a groove rises above the other's tangent plane
-  double gap = 0;                  // no two sides of a joint, and no points of a pole, are further apart
+  double gap = 0;                  // no two sides of a joint, and no points of a pole, are further apart ...
+  double pole_gap = 0;             // ... those of poles
 };
 
 // Fills EdgeLink::kink, kink_bound and gap from the normals on both sides, which must be consistently

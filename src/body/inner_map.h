@@ -4,12 +4,10 @@
 #pragma once
 
 #include <array>
-#include <atomic>
-#include <memory>
-#include <mutex>
 #include <utility>
 #include <vector>
 
+#include "nurbs/lazy.h"
 #include "nurbs/types.h"
 
 namespace nurbs {
@@ -75,38 +73,9 @@ void archive(Archive& a, InnerMap& s) {
 // sides of an opening joint have radius 0, as a crease has. Some tens of ms, 330 kB.
 InnerMap make_inner_map(const Shape& shape);
 
-// A shape's inner map, made when it is asked for: before a run, as it costs more than many contacts. Pairs
-// use those that are there, and ask themselves only where they find no answer otherwise. Copies share it, and
-// any thread may ask.
-class LazyInnerMap {
- public:
-  const InnerMap& of(const Shape& shape) const {
-    std::call_once(made_->once, [&] { put(make_inner_map(shape)); });
-    return made_->map;
-  }
-  bool made() const { return made_->done; }
-  // Empty if it is not made.
-  const InnerMap& known() const {
-    static const InnerMap none;
-    return made_->done ? made_->map : none;
-  }
-  // One made elsewhere, of the same shape.
-  void set(InnerMap map) const {
-    std::call_once(made_->once, [&] { put(std::move(map)); });
-  }
-
- private:
-  struct Made {
-    std::once_flag once;
-    std::atomic<bool> done{false};
-    InnerMap map;
-  };
-  void put(InnerMap map) const {
-    made_->map = std::move(map);
-    made_->done = true;
-  }
-  std::shared_ptr<Made> made_ = std::make_shared<Made>();
-};
+// A shape's inner map: made before a run, as it costs more than many contacts. Pairs use those that are
+// there, and ask themselves only where they find no answer otherwise.
+using LazyInnerMap = Lazy<InnerMap>;
 // Made on the other side where it was here.
 template <class Archive>
 void archive(Archive& a, LazyInnerMap& s) {

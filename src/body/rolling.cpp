@@ -56,7 +56,7 @@ JointDistance measure_joint_distance(const Shape& shape) {
     std::array<double, 4> speed;
     for (int edge = 0; edge < 4; ++edge) {
       const EdgeLink& link = shape.links[p][edge];
-      const double angle = std::max(std::abs(link.kink), link.kink_bound);
+      const double angle = link.widest();
       speed[edge] = link.kinked() ? least[edge / 2] : kInfinity;
       if (link.kinked())
         (link.kink > 0 ? joints.convex : joints.concave) =

@@ -10,6 +10,7 @@
 #include "body/convexity.h"
 #include "body/mass_properties.h"
 #include "body/profile_turn.h"
+#include "body/proofs.h"
 #include "body/rounding.h"
 #include "body/surface_bounds.h"
 #include "nurbs/tolerances.h"
@@ -239,14 +240,6 @@ Proofs summarise(const Shape& s, const SurfaceBounds& bounds, const KinkSummary&
   return proofs;
 }
 
-double find_pole_spread(const PatchLinks& links, double size) {
-  double most = 0;
-  for (const auto& patch : links)
-    for (const EdgeLink& link : patch)
-      if (link.collapsed) most = std::max(most, link.gap);
-  return most > kJointRoundoff * size ? most : 0;
-}
-
 // What the search over patches needs (patch_maximum.h).
 void enclose_patches(Shape& s) {
   s.bilinear = true;
@@ -282,13 +275,18 @@ void measure(Draft& draft) {
   const double rounding = least_rounding(s.patches);
   if (rounding < kFarAway) bounds.radii.min_radius = std::max(bounds.radii.min_radius, rounding);
   s.proofs = summarise(s, bounds, kinks);
-  s.pole_spread = find_pole_spread(s.links, s.bounding_radius);
+  if (kinks.pole_gap > kJointRoundoff * s.bounding_radius) s.pole_spread = kinks.pole_gap;
   s.small_kinks = find_small_kinks(s.links, s.bounding_radius);
   s.patch_curvature = {s.small_kinks.inside(bounds.radii.min_radius),
                        s.small_kinks.outside(bounds.radii.max_radius)};
   s.curvature = add_kinks(s.patch_curvature, kinks);
-  const Dent dent = find_dent(s, sample_surface(s.patches), bounds, kinks);
+  Dent dent = find_dent(s, sample_surface(s.patches), bounds, kinks);
   judge_dent(draft, dent);
+  // Of a body that is proven to have none, what was measured is round-off of flats: a slack, no dent.
+  if (dent.excess > 0 && dent.excess <= kHardlyDented * s.bounding_radius && proven_without_dents(s)) {
+    s.small_kinks.slack += dent.excess;
+    dent.depth = dent.excess = 0;
+  }
   s.concavity = dent.depth;
   s.support_excess = dent.excess + s.joint_slack;
   s.core = find_sphero_polyhedron(s);

@@ -3,6 +3,7 @@
 // particle of that shape shares it.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstdint>
@@ -18,6 +19,7 @@
 #include "body/flat_faces.h"
 #include "body/inner_map.h"
 #include "body/meridian.h"
+#include "body/near_ball.h"
 #include "body/near_revolution.h"
 #include "body/normal_map.h"
 #include "body/profile_radii.h"
@@ -50,7 +52,8 @@ struct EdgeLink {
   double kink_bound = 0;  // no angle between two normals there is larger than this, rad: proven
 
   bool opens() const { return kink > kSmoothKink; }  // to a sharp edge; at a pole: to a tip
-  bool kinked() const { return std::abs(kink) > kNoKink || kink_bound > kNoKink; }
+  double widest() const { return std::max(std::abs(kink), kink_bound); }  // angle seen or allowed
+  bool kinked() const { return widest() > kNoKink; }
 };
 template <class Archive>
 void archive(Archive& a, EdgeLink& s) {
@@ -181,6 +184,7 @@ struct Shape {
   NormalMap normal_map;             // local bounds, for bodies with flats or dents
   DirectionAtlas atlas;
   LazyInnerMap lazy_inner_map;
+  Lazy<NearBall> near_ball;             // balls inside piece by piece, if the body is nearly one
   SupportCells support_cells;           // where the hull's supports lie, near dents
   Ellipsoid ellipsoid;                  // that the body is, if it is one
   Revolution revolution;                // about an axis, if the body is one
@@ -196,15 +200,17 @@ struct Shape {
 
   // Balls inside the body over directions, which spare deep contacts of round bodies a search. Made the first
   // time, before a run: 10 to 100 ms.
-  const InnerMap& inner_map() const { return lazy_inner_map.of(*this); }
+  const InnerMap& inner_map() const {
+    return lazy_inner_map.get([this] { return make_inner_map(*this); });
+  }
   // Whether a local maximum of d . x may be no global one.
   bool dented() const { return support_excess > kRoundoff * bounding_radius; }
 };
 
-// What a normal may err by, rad, because a collapsed edge is no point: `shorter` is the shorter tangent's
-// length at scale 1.
-inline double pole_noise(const Shape& shape, double shorter) {
-  return shape.pole_spread > 0 ? kPoleSpreadSafety * shape.pole_spread / shorter : 0;
+// What a normal may err by, rad, because a collapsed edge is no point: `shorter2` is the squared length of
+// the shorter tangent at scale 1.
+inline double pole_noise(const Shape& shape, double shorter2) {
+  return shape.pole_spread > 0 ? kPoleSpreadSafety * shape.pole_spread / std::sqrt(shorter2) : 0;
 }
 
 // Whether there is such a point: memory may hold none, or one of another shape, or no numbers.

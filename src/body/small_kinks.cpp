@@ -18,7 +18,7 @@ SmallKinks find_small_kinks(const std::vector<std::array<EdgeLink, 4>>& links, d
   double kink = 0;
   for (const auto& patch : links)
     for (const EdgeLink& link : patch)
-      if (!link.kinked()) kink = std::max({kink, std::abs(link.kink), link.kink_bound});
+      if (!link.kinked()) kink = std::max(kink, link.widest());
   SmallKinks small;
   const double met = kGapsCrossed * kink, half = 0.5 * met * met;
   if (!(half > 0)) return small;

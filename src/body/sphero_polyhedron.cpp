@@ -220,7 +220,7 @@ class Finder {
   double largest_kink() const {
     double most = 0;
     for (const auto& links : shape_.links)
-      for (const EdgeLink& link : links) most = std::max({most, std::abs(link.kink), link.kink_bound});
+      for (const EdgeLink& link : links) most = std::max(most, link.widest());
     return most;
   }
   bool all_between() {

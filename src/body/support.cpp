@@ -190,7 +190,7 @@ Normal normal_at(const Shape& shape, const Vec3& su, const Vec3& sv) {
   const double shorter2 = std::min(su.squaredNorm(), sv.squaredNorm());
   if (shorter2 * shorter2 < kNearPole * kNearPole * product2)
     normal.noise += kTangentNoise * shape.bounding_radius / std::sqrt(shorter2);
-  if (shape.pole_spread > 0) normal.noise += pole_noise(shape, std::sqrt(shorter2));
+  normal.noise += pole_noise(shape, shorter2);
   return normal;
 }
 

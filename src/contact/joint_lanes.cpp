@@ -74,7 +74,7 @@ NURBS_INLINE Sides look(unsigned open, const Shape* const (&shape)[kWidth], cons
     out.outer[l] = r.outer;
     out.slack[l] = r.slack;
     out.near[l] = r.near;
-    if (shape[l]->pole_spread > 0) out.noise[l] = pole_noise(*shape[l], std::sqrt(std::min(lu[l], lv[l])));
+    out.noise[l] = pole_noise(*shape[l], std::min(lu[l], lv[l]));
     dented[l] = dented[l] || (r.slack > kRoundoff * shape[l]->bounding_radius && !(r.near < kFarAway));
   }
   out.plain &= (norm2(area) > lost_area2<Wide>(lu + lv, size)) & (out.noise < kNearPole);

@@ -133,8 +133,7 @@ NURBS_INLINE Normal outward(const JetLanes& j, const SurfacePoint& at, const Sha
   if ((fades ? area2 < kNear * faded2 * longer : shorter < kNear * longer) ||
       area2 <= lost_area2(speed2, size))
     n.noise = area2 > 0 ? std::min(kNoNormal, kTangentNoise * size * std::sqrt(speed2 / area2)) : kNoNormal;
-  if (shape.pole_spread > 0)
-    n.noise = std::min(kNoNormal, n.noise + pole_noise(shape, std::sqrt(std::max(faded2, shorter)) / scale));
+  n.noise = std::min(kNoNormal, n.noise + pole_noise(shape, std::max(faded2, shorter) / (scale * scale)));
   n.direction.normalize();
   return n;
 }

@@ -40,8 +40,7 @@ bool solve_warm(const Shape& shape, const Vec3& d, SurfacePoint at, double toler
     const SurfacePoint next{at.patch, at.u + du, at.v + dv};
     if (!next.on_patch()) return false;
     const double excess =
-        support_excess(shape, 1, radii_at(shape, at, nullptr, n), d, n,
-                       shape.pole_spread > 0 ? pole_noise(shape, std::sqrt(std::min(lu, lv))) : 0);
+        support_excess(shape, 1, radii_at(shape, at, nullptr, n), d, n, pole_noise(shape, std::min(lu, lv)));
     const double roundoff = kRoundoff * shape.bounding_radius + shape.small_kinks.slack;
     if (excess <= tolerance &&
         (d - n).squaredNorm() * shape.bounding_radius <= std::max(tolerance, roundoff) &&

@@ -6,6 +6,9 @@
 #include <cmath>
 #include <map>
 
+#include "body/support.h"
+#include "nurbs/affine.h"
+#include "shapes/primitives.h"
 #include "shapes/revolved.h"
 #include "support/bodies.h"
 #include "support/hidden_dents.h"
@@ -332,6 +335,47 @@ PairCase slight_kinks(Random& random, long) {
                random.below(4) ? 1e-2 : 0.5);
 }
 
+// Spheres as files of 6 to 11 decimals have them, and fits of spheres.
+const std::vector<std::shared_ptr<const Shape>>& nearly_balls() {
+  static const std::vector<std::shared_ptr<const Shape>> all = [] {
+    Random random(1014);
+    std::vector<std::shared_ptr<const Shape>> made;
+    for (int k = 0; k < 12; ++k) {
+      auto surfaces = k % 2 ? exact_ellipsoid(Vec3(1, 1, 1)) : revolved_ellipsoid(1, 1);
+      transform(surfaces, random.uniform(0.7, 1.4) * random.turn().toRotationMatrix(), random.vector());
+      made.push_back(make_shape("sphere", test::with_decimals(surfaces, 6 + k / 2)));
+    }
+    for (const int spans : {2, 4}) made.push_back(make_shape("fit", fitted_ellipsoid(Vec3(1, 1, 1), spans)));
+    return made;
+  }();
+  return all;
+}
+
+// About one centre, to a tenth of their size; supports are the library's.
+PairCase nearly_ball_pair(Random& random, long) {
+  const auto& bodies = nearly_balls();
+  const auto any = [&] { return bodies[random.below(static_cast<int>(bodies.size()))].get(); };
+  PairCase c;
+  c.a = {any(), 1, random.vector(), random.turn()};
+  c.b = {random.below(3) ? any() : unit_ball().shape.get(), random.below(2) ? 1 : random.log_uniform(0.2, 5),
+         Vec3::Zero(), random.turn()};
+  c.b.x = c.a.x;
+  if (random.below(4))
+    c.b.x += std::min(1.0, c.b.scale) * random.log_uniform(1e-13, 0.1) * random.direction();
+  const Mat3 to_a = c.a.q.toRotationMatrix().transpose(), to_b = c.b.q.toRotationMatrix().transpose();
+  const auto height = [](const Shape& shape, const Vec3& d) {
+    return find_hull_support(shape, d, nullptr, 1e-14, 1e-14).h;
+  };
+  c.truth.known = Known::bound;
+  c.truth.gap = -test::least_overlap(
+      [&](const Vec3& d) {
+        return height(*c.a.shape, to_a * d) + c.b.scale * height(*c.b.shape, to_b * -d) -
+               d.dot(c.b.x - c.a.x);
+      },
+      test::spiral(500), {}, random);
+  return c;
+}
+
 }  // namespace
 
 const std::vector<Solid>& solids_of(Kind kind) {
@@ -366,6 +410,8 @@ const std::vector<Family>& solid_families() {
        few_digits},
       {"slight kinks", "two balls' common parts and images of them, kinks of 1e-11 to 1e-7 rad, and lenses",
        kPairs, slight_kinks},
+      {"nearly balls", "spheres of 6 to 11 decimals, and fits of spheres, about one centre, to 0.1 of it",
+       10000, nearly_ball_pair},
   };
   return all;
 }

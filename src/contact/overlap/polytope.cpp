@@ -6,6 +6,7 @@
 
 #include "contact/overlap/ball_hull_search.h"
 #include "contact/overlap/cell_search.h"
+#include "contact/overlap/near_ball_search.h"
 #include "contact/overlap/polytope_search.h"
 #include "contact/overlap/ring_search.h"
 #include "contact/overlap/segment_search.h"
@@ -43,6 +44,10 @@ bool has_rings(const Shape& shape) {
   return revolution_of(shape).found || !shape.round_edges.empty();
 }
 
+bool has_ball_parts(const Shape& shape) {
+  return shape.inner_balls.found();
+}
+
 // What two attempts know together: the narrower one's points, along the direction of the higher lower end.
 PolytopeResult both(const PolytopeResult& x, const PolytopeResult& y, double tolerance) {
   PolytopeResult r = y.bracket.width() < x.bracket.width() ? y : x;
@@ -74,6 +79,14 @@ PolytopeResult solve_polytope(const PairFrame& pair, const Vec3& seed, double to
   if (search_segments(pair, tolerance, &best) || search_ball_hulls(pair, tolerance, &best, &upper) ||
       search_segment_in_ellipsoid(pair, seed, tolerance, &best))
     return best;
+  // Where parts of the bodies are parts of balls, those tell more.
+  const bool near = are_near_balls(pair),
+             near_first = near && !has_ball_parts(*pair.a) && !has_ball_parts(*pair.b);
+  PolytopeResult balls;
+  if (near_first) {
+    if (search_near_balls(pair, tolerance, &balls)) return balls;
+    upper = std::min(upper, balls.bracket.upper);
+  }
   Vec3 from = seed;
   bool points = true;
   double searched = kFarAway;  // the lower end with which all that is left was tried in vain
@@ -118,6 +131,10 @@ PolytopeResult solve_polytope(const PairFrame& pair, const Vec3& seed, double to
   }
   if (!best.converged && !(best.bracket.lower > enough) && best.bracket.lower != searched)
     search_last(pair, tolerance, &best);
+  if (near && !best.converged && !(best.bracket.lower > enough)) {
+    if (!near_first) search_near_balls(pair, tolerance, &balls);
+    best = both(best, balls, tolerance);
+  }
   return best;
 }
 

@@ -4,31 +4,14 @@
 #pragma once
 
 #include <array>
-#include <new>
-#include <type_traits>
 
 #include "body/hull_point.h"
 #include "contact/overlap/growing_hull.h"
 #include "contact/overlap/polytope.h"
 #include "contact/overlap/turn_bound.h"
+#include "nurbs/room.h"
 
 namespace nurbs {
-
-// Room for many, each made when it is put there.
-template <class T, int N>
-class Room {
-  static_assert(std::is_trivially_destructible_v<T>);
-
- public:
-  T& put(int k, const T& value) { return *new (bytes_ + k * sizeof(T)) T(value); }
-  T& operator[](int k) { return *std::launder(reinterpret_cast<T*>(bytes_ + k * sizeof(T))); }
-  const T& operator[](int k) const {
-    return *std::launder(reinterpret_cast<const T*>(bytes_ + k * sizeof(T)));
-  }
-
- private:
-  alignas(T) unsigned char bytes_[N * sizeof(T)];
-};
 
 // That of the points along the normal, which are moved to be it apart. Where the bracket stayed open, the
 // least overlap seen: the hull errs to first order, the direction to second.
