@@ -10,7 +10,6 @@
 #include "body/convexity.h"
 #include "body/mass_properties.h"
 #include "body/profile_turn.h"
-#include "body/proofs.h"
 #include "body/rounding.h"
 #include "body/surface_bounds.h"
 #include "nurbs/tolerances.h"
@@ -280,13 +279,8 @@ void measure(Draft& draft) {
   s.patch_curvature = {s.small_kinks.inside(bounds.radii.min_radius),
                        s.small_kinks.outside(bounds.radii.max_radius)};
   s.curvature = add_kinks(s.patch_curvature, kinks);
-  Dent dent = find_dent(s, sample_surface(s.patches), bounds, kinks);
+  const Dent dent = find_dent(s, sample_surface(s.patches), bounds, kinks);
   judge_dent(draft, dent);
-  // Of a body that is proven to have none, what was measured is round-off of flats: a slack, no dent.
-  if (dent.excess > 0 && dent.excess <= kHardlyDented * s.bounding_radius && proven_without_dents(s)) {
-    s.small_kinks.slack += dent.excess;
-    dent.depth = dent.excess = 0;
-  }
   s.concavity = dent.depth;
   s.support_excess = dent.excess + s.joint_slack;
   s.core = find_sphero_polyhedron(s);

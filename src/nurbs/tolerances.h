@@ -87,7 +87,6 @@ constexpr int kCubicAngles = 16;           // at which the third-order form is l
 constexpr double kAllowedDent = 1e-3;      // deeper is no convex body; up to this, a dent is left to the hull
 constexpr double kUnmentionedDent = 1e-6;  // deeper is worth a warning
 constexpr double kNoDent = 1e-13;          // round-off of a difference of supports
-constexpr double kHardlyDented = 1e-12;    // shallower is no dent of a body that is proven to have none
 constexpr double kHollowNoise = 2e-13;  // over the bounding radius: hollows of less curvature are no deeper
 constexpr int kPairsIfConvex = 1200, kPairsIfDented = 4000;  // samples compared with each other
 constexpr int kDentStarts = 1000;         // samples from which the best start of a support is taken

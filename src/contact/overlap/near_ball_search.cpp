@@ -24,8 +24,10 @@ constexpr int kAsked = 32;            // directions along which p is remembered
 constexpr double kAsNear = 0.25;      // of a cone: p is not asked for again
 constexpr double kStartNear = 0.3;    // rad: supports are searched from there
 constexpr double kNearCones = 6;      // angles of a cone about which others are searched with it
-constexpr double kInside = 0.3;       // of the inner radius: where origins lie
-constexpr double kNarrower = 0.5;     // than the cone before, at most
+constexpr int kMostOrigins = 200;
+constexpr double kCosineRoundoff = 1e-15;
+constexpr double kInside = 0.3;    // of the inner radius: where origins lie
+constexpr double kNarrower = 0.5;  // than the cone before, at most
 
 const NearBall& near_ball(const Shape& shape) {
   return shape.near_ball.get([&] { return make_near_ball(shape); });
@@ -81,7 +83,7 @@ struct Cone {
   bool meets(const Vec3& other, double sine, double cosine) const {
     if (angle >= M_PI || cosine <= 0) return true;
     const double sum = angle + std::asin(std::min(1.0, sine));
-    return sum >= M_PI || other.dot(axis) >= std::cos(sum);
+    return sum >= M_PI || other.dot(axis) >= std::cos(sum) - kCosineRoundoff;
   }
 };
 
@@ -95,7 +97,8 @@ class NearBallSearch {
     search(Cone());
     while (cones_ > 0) {
       const Cone next = more_[--cones_];
-      if (next.bound < closed() && parted_ < kMostParted && look_along(next.axis))
+      if (next.bound < closed() && parted_ < kMostParted && origins_++ < kMostOrigins &&
+          look_along(next.axis))
         search(next);
       else
         least_ = std::min(least_, next.bound);
@@ -123,6 +126,7 @@ class NearBallSearch {
     bool room = true;
     for (int i = 0; i < a_.patches(); ++i)
       for (int j = 0; j < b_.patches() && room; ++j) room = open(i, j);
+    if (!room) least_ = std::min(least_, cone.bound);  // some are not even bounded
     while (room && count_ > 0 && open_[0].bound < closed()) {
       const Open lowest = open_[0];
       std::pop_heap(open_.begin(), open_.begin() + count_, above);
@@ -160,7 +164,8 @@ class NearBallSearch {
     const BallPiece &a = a_[i], &b = b_[j];
     const Vec3 axis_b = -(pair_.turn * b.axis);
     // Where the angles make less than pi together.
-    if (a.cosine > -b.cosine && a.axis.dot(axis_b) < a.cosine * b.cosine - a.sine * b.sine) return true;
+    if (a.cosine > -b.cosine && a.axis.dot(axis_b) < a.cosine * b.cosine - a.sine * b.sine - kCosineRoundoff)
+      return true;
     const BallPiece& narrower = a.cosine > b.cosine ? a : b;
     const Vec3& axis = a.cosine > b.cosine ? a.axis : axis_b;
     if (!cone_.meets(axis, narrower.sine, narrower.cosine)) return true;
@@ -170,7 +175,7 @@ class NearBallSearch {
     made.i = i;
     made.j = j;
     made.direction = axis;
-    made.sine = narrower.sine;
+    made.sine = narrower.cosine > 0 ? narrower.sine : 1;
     made.loss = pair_.scale_a * a.loss + pair_.scale_b * b.loss;
     double least;                              // of d . g
     if (-along >= length * narrower.cosine) {  // -g is in the cone
@@ -274,7 +279,7 @@ class NearBallSearch {
   double best_ = kFarAway, least_ = kFarAway;
   Vec3 direction_ = Vec3::UnitX();
   Support on_a_, on_b_;
-  int evaluations_ = 0, parted_ = 0, count_ = 0, left_ = 0, cones_ = 0;
+  int evaluations_ = 0, parted_ = 0, count_ = 0, left_ = 0, cones_ = 0, origins_ = 0;
   Cone cone_, more_[kMostCones];
   struct Asked {
     Vec3 d;
