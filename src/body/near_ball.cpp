@@ -139,13 +139,16 @@ void fit(const Part& part, const NearBall& body, const Vec3& origin, BallPiece* 
                kept =
                    q_along * piece->cosine - std::sqrt(std::max(0.0, q2 - q_along * q_along)) * piece->sine,
                kept2 = kept > 0 ? kept * kept : 0,
-               radius2 = body.radius * body.radius + least + piece->centre.squaredNorm() - q2 + kept2 -
-                         kBernsteinRoundoff * farthest,
-               radius = std::sqrt(std::max(0.0, radius2));
-  piece->radius = std::max(0.0, radius - body.gape);
-  piece->lack =
-      std::sqrt(std::max(0.0, radius2 + (most - least))) - radius + std::sqrt(q2) * (1 - piece->cosine);
-  piece->loss = radius > 0 ? 0.5 * (q2 - kept2) / radius : kFarAway;
+               inside2 = body.radius * body.radius + least + piece->centre.squaredNorm() - q2 -
+                         kBernsteinRoundoff * farthest;
+  // With the origin outside the ball no more is known than that the body holds it.
+  const bool inside = inside2 > 0;
+  const double radius = inside ? std::sqrt(inside2 + kept2) : -std::sqrt(q2);
+  piece->radius = radius - body.gape;
+  piece->lack = inside
+                    ? std::sqrt(inside2 + kept2 + most - least) - radius + std::sqrt(q2) * (1 - piece->cosine)
+                    : body.radius;
+  piece->loss = inside ? 0.5 * (q2 - kept2) / radius : 0;
   piece->halves = -1;
 }
 

@@ -20,8 +20,8 @@ struct Shape;
 // s is no less than the larger root of |o + s d - centre| = r, so that with q = centre - o
 //     h(d) >= d . centre + sqrt(r^2 - |q|^2 + (d . q)^2),
 // where (d . q)^2 has a least value in the cone. As a ball's support is r + d . centre, what q has across d
-// is lost: the loss is least where the body's normal leads through o. Hypotheses: the origin lies in the
-// body, and its pieces leave no ray from there a way between them: they are widened, and their balls made
+// is lost: the loss is least where the body's normal leads through o. Hypotheses: |q| < r; the origin lies in
+// the body, and its pieces leave no ray from there a way between them: they are widened, and their balls made
 // smaller, by what joints and poles gape.
 struct BallPiece {
   int patch;
