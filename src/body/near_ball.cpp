@@ -13,12 +13,12 @@
 namespace nurbs {
 namespace {
 
-constexpr double kNearly = 8e-3;   // of the bounding radius, that the inner one lacks
-constexpr int kMostPatches = 128;  // pairs of patches are looked at one by one
-constexpr int kMostPieces = 4000;
-constexpr double kLack = 1.5e-11;      // of the bounding radius, at which pieces are not halved
-constexpr double kConeMargin = 1e-12;  // rad
-constexpr double kLeastBulge = 1e-10;  // determinant of a piece's second moments over their product
+constexpr double kNearly = 8e-3;              // of the bounding radius, that the inner one lacks
+constexpr int kMostPatches = 128;             // pairs of patches are looked at one by one
+constexpr std::size_t kMostWork = 4000 * 81;  // coefficients of all pieces
+constexpr double kLack = 1.5e-11;             // of the bounding radius, at which pieces are not halved
+constexpr double kConeMargin = 1e-12;         // rad
+constexpr double kLeastBulge = 1e-10;         // determinant of a piece's second moments over their product
 
 using Coefficient = BallNet::Coefficient;
 Vec3 point(const Coefficient& c) {
@@ -192,7 +192,9 @@ NearBall make_near_ball(const Shape& shape) {
     out.patches.push_back(net_of(shape.patches[k], out.radius));
     put(out.whole(k, Vec3::Zero()));
   }
-  while (!lacking.empty() && out.pieces.size() + 2 <= kMostPieces) {
+  std::size_t largest = 0;
+  for (const BallNet& patch : out.patches) largest = std::max(largest, patch.net.size());
+  while (!lacking.empty() && (out.pieces.size() + 2) * largest <= kMostWork) {
     const int k = lacking.top().second;
     lacking.pop();
     BallPiece first, second;

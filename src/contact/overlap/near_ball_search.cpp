@@ -10,11 +10,13 @@
 namespace nurbs {
 namespace {
 
-constexpr int kMostPairs = 4096;      // open at once
-constexpr int kMostParted = 8000;     // in all
-constexpr int kMostMade = 2048;       // pieces of a body that are made about an origin
-constexpr int kMostLeft = 1024;       // that wait for another origin, and ...
-constexpr int kMostCones = 64;        // ... cones of them
+constexpr int kMostPairs = 4096;  // open at once
+constexpr long kMostWork =
+    1000000;                     // coefficients looked at in all, some 20 ms; a pair of pieces counts as ...
+constexpr long kPairWork = 4;    // ... so many
+constexpr int kMostMade = 2048;  // pieces of a body that are made about an origin
+constexpr int kMostLeft = 1024;  // that wait for another origin, and ...
+constexpr int kMostCones = 64;   // ... cones of them
 constexpr int kAlwaysEvaluated = 16;  // pairs ...
 constexpr double kShare = 0.25;       // ... and those later that so much of their spread below ...
 constexpr double kGain = 0.1;         // ... would gain as much, of the tolerance
@@ -26,8 +28,9 @@ constexpr double kStartNear = 0.3;    // rad: supports are searched from there
 constexpr double kNearCones = 6;      // angles of a cone about which others are searched with it
 constexpr int kMostOrigins = 200;
 constexpr double kCosineRoundoff = 1e-15;
-constexpr double kInside = 0.3;    // of the inner radius: where origins lie
-constexpr double kNarrower = 0.5;  // than the cone before, at most
+constexpr double kNoLength = 1e-100;  // has no direction, its square underflows
+constexpr double kInside = 0.3;       // of the inner radius: where origins lie
+constexpr double kNarrower = 0.5;     // than the cone before, at most
 
 const NearBall& near_ball(const Shape& shape) {
   return shape.near_ball.get([&] { return make_near_ball(shape); });
@@ -41,9 +44,13 @@ class Pieces {
   void see_from(const Vec3& origin) {
     origin_ = origin;
     known_ = count_ = parted_ = 0;
-    for (int k = 0; k < patches(); ++k) made_.put(count_++, body_.whole(k, origin));
+    for (int k = 0; k < patches(); ++k) {
+      made_.put(count_++, body_.whole(k, origin));
+      work_ += size(k);
+    }
   }
   int patches() const { return static_cast<int>(body_.patches.size()); }
+  long work() const { return work_; }  // coefficients looked at
   const BallPiece& operator[](int k) const { return k < known_ ? body_.pieces[k] : made_[k - known_]; }
   // Number of the first of a piece's halves, or -1 where there is no more room.
   int halves(int k) {
@@ -53,6 +60,7 @@ class Pieces {
       for (int i = 0; i < parted_; ++i)
         if (leaf_[i] == k) return first_[i];
     if (count_ + 2 > kMostMade) return -1;
+    work_ += 2 * size(piece.patch);
     BallPiece one, other;
     body_.halve(piece, origin_, &one, &other);
     const int first = known_ + count_;
@@ -68,7 +76,10 @@ class Pieces {
   }
 
  private:
+  long size(int patch) const { return static_cast<long>(body_.patches[patch].net.size()); }
+
   const NearBall& body_;
+  long work_ = 0;
   Vec3 origin_ = Vec3::Zero();
   int known_, count_ = 0, parted_ = 0;
   int leaf_[kMostMade / 2], first_[kMostMade / 2];  // halved, of the body's
@@ -93,12 +104,11 @@ class NearBallSearch {
       : pair_(pair), tolerance_(tolerance), a_(near_ball(*pair.a)), b_(near_ball(*pair.b)) {}
 
   bool run(PolytopeResult* result) {
-    evaluate(pair_.offset.squaredNorm() > 0 ? Vec3(pair_.offset.normalized()) : Vec3(Vec3::UnitX()), 0);
+    evaluate(pair_.offset.norm() > kNoLength ? pair_.offset : Vec3(Vec3::UnitX()), 0);
     search(Cone());
     while (cones_ > 0) {
       const Cone next = more_[--cones_];
-      if (next.bound < closed() && parted_ < kMostParted && origins_++ < kMostOrigins &&
-          look_along(next.axis))
+      if (next.bound < closed() && !is_exhausted() && origins_++ < kMostOrigins && look_along(next.axis))
         search(next);
       else
         least_ = std::min(least_, next.bound);
@@ -131,20 +141,21 @@ class NearBallSearch {
       const Open lowest = open_[0];
       std::pop_heap(open_.begin(), open_.begin() + count_, above);
       --count_;
-      if (parted_ < kAlwaysEvaluated || is_promising(lowest))
+      if (popped_++ < kAlwaysEvaluated || is_promising(lowest))
         evaluate(lowest.direction, kAsNear * lowest.sine);
       if (!(lowest.bound < closed()))
         least_ = std::min(least_, lowest.bound);
       else if (lowest.spread <= std::max(lowest.loss, kSpent * tolerance_))
         room = leave(lowest);
       else
-        room = parted_++ < kMostParted && part(lowest);
+        room = !is_exhausted() && part(lowest);
       if (!room) least_ = std::min(least_, lowest.bound);
     }
     if (count_ > 0) least_ = std::min(least_, open_[0].bound);
     gather();
   }
 
+  bool is_exhausted() const { return a_.work() + b_.work() + kPairWork * opened_ > kMostWork; }
   // Whether p may well be less than it is known to be, where the bound is least.
   bool is_promising(const Open& pair) const {
     return pair.bound + kShare * (pair.spread + pair.loss) < best_ - kGain * tolerance_;
@@ -161,6 +172,7 @@ class NearBallSearch {
 
   // Bounds p over the directions that are both pieces'; false where there is no room left.
   bool open(int i, int j) {
+    ++opened_;
     const BallPiece &a = a_[i], &b = b_[j];
     const Vec3 axis_b = -(pair_.turn * b.axis);
     // Where the angles make less than pi together.
@@ -180,12 +192,13 @@ class NearBallSearch {
     double least;                              // of d . g
     if (-along >= length * narrower.cosine) {  // -g is in the cone
       least = -length;
-      if (length > 0) made.direction = -g / length;
+      if (length > kNoLength) made.direction = -g / length;
     } else {
-      const Vec3 across = g - along * axis;
+      Vec3 across = g - along * axis;
+      across -= axis.dot(across) * axis;  // what round-off has left along it
       const double off = across.norm();
       least = narrower.cosine * along - narrower.sine * off;
-      if (off > 0) made.direction = narrower.cosine * axis - narrower.sine / off * across;
+      if (off > kNoLength) made.direction = narrower.cosine * axis - narrower.sine / off * across;
     }
     made.bound = pair_.scale_a * a.radius + pair_.scale_b * b.radius - 4 * pair_.noise + least;
     made.spread = pair_.scale_a * a.lack + pair_.scale_b * b.lack + along - least;
@@ -243,8 +256,9 @@ class NearBallSearch {
     return look(*pair_.a, d, &a_) && look(*pair_.b, pair_.direction_on_b(d), &b_);
   }
 
-  // p along d, unless it was asked for within a chord of `near` lately.
-  void evaluate(const Vec3& d, double near) {
+  // p along a direction of any length, unless it was asked for within a chord of `near` lately.
+  void evaluate(const Vec3& along, double near) {
+    const Vec3 d = along.normalized();
     int nearest = -1;
     double least2 = kFarAway;
     for (int k = 0; k < std::min(evaluations_, kAsked); ++k)
@@ -276,10 +290,11 @@ class NearBallSearch {
   const PairFrame& pair_;
   double tolerance_;
   Pieces a_, b_;
+  long opened_ = 0;
   double best_ = kFarAway, least_ = kFarAway;
   Vec3 direction_ = Vec3::UnitX();
   Support on_a_, on_b_;
-  int evaluations_ = 0, parted_ = 0, count_ = 0, left_ = 0, cones_ = 0, origins_ = 0;
+  int evaluations_ = 0, popped_ = 0, count_ = 0, left_ = 0, cones_ = 0, origins_ = 0;
   Cone cone_, more_[kMostCones];
   struct Asked {
     Vec3 d;
