@@ -10,13 +10,12 @@
 namespace nurbs {
 namespace {
 
-constexpr int kMostPairs = 4096;  // open at once
-constexpr long kMostWork =
-    1000000;                     // coefficients looked at in all, some 20 ms; a pair of pieces counts as ...
-constexpr long kPairWork = 4;    // ... so many
-constexpr int kMostMade = 2048;  // pieces of a body that are made about an origin
-constexpr int kMostLeft = 1024;  // that wait for another origin, and ...
-constexpr int kMostCones = 64;   // ... cones of them
+constexpr int kMostPairs = 4096;    // open at once
+constexpr long kMostWork = 600000;  // coefficients looked at in all, some 10 ms; a pair of pieces counts ...
+constexpr long kPairWork = 4;       // ... as so many, supports as those of half a patch of each
+constexpr int kMostMade = 2048;     // pieces of a body that are made about an origin
+constexpr int kMostLeft = 1024;     // that wait for another origin, and ...
+constexpr int kMostCones = 64;      // ... cones of them
 constexpr int kAlwaysEvaluated = 16;  // pairs ...
 constexpr double kShare = 0.25;       // ... and those later that so much of their spread below ...
 constexpr double kGain = 0.1;         // ... would gain as much, of the tolerance
@@ -75,9 +74,9 @@ class Pieces {
     return first;
   }
 
- private:
   long size(int patch) const { return static_cast<long>(body_.patches[patch].net.size()); }
 
+ private:
   const NearBall& body_;
   long work_ = 0;
   Vec3 origin_ = Vec3::Zero();
@@ -155,7 +154,10 @@ class NearBallSearch {
     gather();
   }
 
-  bool is_exhausted() const { return a_.work() + b_.work() + kPairWork * opened_ > kMostWork; }
+  bool is_exhausted() const {
+    const long supports = evaluations_ * (a_.size(0) + b_.size(0)) / 2;
+    return a_.work() + b_.work() + kPairWork * opened_ + supports > kMostWork;
+  }
   // Whether p may well be less than it is known to be, where the bound is least.
   bool is_promising(const Open& pair) const {
     return pair.bound + kShare * (pair.spread + pair.loss) < best_ - kGain * tolerance_;
