@@ -234,7 +234,8 @@ class NearBallSearch {
         const Open& pair = waits_[k];
         const double chord = (pair.direction - first.direction).norm();
         if (chord <= near && pair.sine <= near)
-          cone.angle = std::max(cone.angle, 2 * (std::asin(0.5 * chord) + std::asin(pair.sine)));
+          cone.angle = std::max(
+              cone.angle, 2 * (std::asin(std::min(1.0, 0.5 * chord)) + std::asin(std::min(1.0, pair.sine))));
         else
           waits_[kept++] = pair;
       }
