@@ -2,7 +2,6 @@
 #include "body/bounds.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <limits>
 #include <queue>
@@ -97,37 +96,21 @@ double bound_squared(const std::vector<BezierPatch>& patches, double sign) {
 
 }  // namespace
 
-// As Bernstein products (NURBS Book, section 6.3: C(p,i) C(p,k) / C(2p,i+k)).
 SquaredDistance squared_distance(const BezierPatch& patch, double less) {
-  const int p = patch.degree_u, q = patch.degree_v;
   SquaredDistance f;
-  f.m = 2 * p;
-  f.n = 2 * q;
+  f.m = 2 * patch.degree_u;
+  f.n = 2 * patch.degree_v;
   f.num.assign(static_cast<size_t>(f.m + 1) * (f.n + 1), 0);
   f.den = f.num;
-  std::array<double, kMaxDegree + 1> cp, cq;
-  for (int i = 0; i <= p; ++i) cp[i] = binomial(p, i);
-  for (int j = 0; j <= q; ++j) cq[j] = binomial(q, j);
-  for (int i = 0; i <= p; ++i) {
-    for (int j = 0; j <= q; ++j) {
-      for (int k = 0; k <= p; ++k) {
-        for (int l = 0; l <= q; ++l) {
-          const Vec4 &a = patch.point(i, j), &b = patch.point(k, l);
-          const double c = cp[i] * cp[k] * cq[j] * cq[l];
-          const size_t at = static_cast<size_t>(i + k) * (f.n + 1) + (j + l);
-          const double weight = a[3] * b[3];
-          f.num[at] += c * (a.head<3>().dot(b.head<3>()) - less * weight);
-          f.den[at] += c * weight;
-        }
-      }
-    }
-  }
-  for (int i = 0; i <= f.m; ++i) {
-    for (int j = 0; j <= f.n; ++j) {
-      const double c = binomial(f.m, i) * binomial(f.n, j);
-      f.num[static_cast<size_t>(i) * (f.n + 1) + j] /= c;
-      f.den[static_cast<size_t>(i) * (f.n + 1) + j] /= c;
-    }
+  visit_products(patch, [&](size_t at, double c, const Vec4& a, const Vec4& b) {
+    const double weight = a[3] * b[3];
+    f.num[at] += c * (a.head<3>().dot(b.head<3>()) - less * weight);
+    f.den[at] += c * weight;
+  });
+  for (size_t at = 0; at < f.num.size(); ++at) {
+    const double c = product_weight(f.m, f.n, at);
+    f.num[at] /= c;
+    f.den[at] /= c;
   }
   return f;
 }

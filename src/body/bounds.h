@@ -1,11 +1,36 @@
 // Rigorous bounds of a body's distance from the origin, from control nets.
 #pragma once
 
+#include <array>
+#include <cstddef>
 #include <vector>
 
+#include "nurbs/bernstein.h"
 #include "nurbs/bezier_patch.h"
 
 namespace nurbs {
+
+// Calls visit(at, c, a, b) for all pairs of a patch's control points: a term of theirs is c times it in
+// coefficient `at`, v fastest, of their product, which is to be divided by product_weight (NURBS Book,
+// section 6.3: C(p,i) C(p,k) / C(2p,i+k)).
+template <class Visit>
+void visit_products(const BezierPatch& patch, const Visit& visit) {
+  const int p = patch.degree_u, q = patch.degree_v;
+  std::array<double, kMaxDegree + 1> cp, cq;
+  for (int i = 0; i <= p; ++i) cp[i] = binomial(p, i);
+  for (int j = 0; j <= q; ++j) cq[j] = binomial(q, j);
+  for (int i = 0; i <= p; ++i)
+    for (int j = 0; j <= q; ++j)
+      for (int k = 0; k <= p; ++k)
+        for (int l = 0; l <= q; ++l)
+          visit(static_cast<std::size_t>(i + k) * (2 * q + 1) + (j + l), cp[i] * cp[k] * cq[j] * cq[l],
+                patch.point(i, j), patch.point(k, l));
+}
+// Of coefficient `at`, degrees m and n.
+inline double product_weight(int m, int n, std::size_t at) {
+  const int i = static_cast<int>(at) / (n + 1), j = static_cast<int>(at) % (n + 1);
+  return binomial(m, i) * binomial(n, j);
+}
 
 // (|x|^2 - less) w^2 and w^2 of a patch, Bernstein coefficients of twice its degrees, (i, j) at i (n + 1) +
 // j.

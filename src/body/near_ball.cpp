@@ -7,6 +7,7 @@
 #include <queue>
 #include <utility>
 
+#include "body/bounds.h"
 #include "body/shape.h"
 #include "nurbs/bernstein.h"
 
@@ -26,21 +27,15 @@ Vec3 point(const Coefficient& c) {
 }
 
 BallNet net_of(const BezierPatch& patch, double radius) {
-  const int p = patch.degree_u, q = patch.degree_v;
-  BallNet out{2 * p, 2 * q, {}};
+  BallNet out{2 * patch.degree_u, 2 * patch.degree_v, {}};
   out.net.assign(static_cast<std::size_t>(out.m + 1) * (out.n + 1), Coefficient::Zero());
-  for (int i = 0; i <= p; ++i)
-    for (int j = 0; j <= q; ++j)
-      for (int k = 0; k <= p; ++k)
-        for (int l = 0; l <= q; ++l) {
-          const Vec4 &a = patch.point(i, j), &b = patch.point(k, l);
-          const double c = binomial(p, i) * binomial(p, k) * binomial(q, j) * binomial(q, l) /
-                           (binomial(out.m, i + k) * binomial(out.n, j + l));
-          Coefficient& to = out.net[static_cast<std::size_t>(i + k) * (out.n + 1) + (j + l)];
-          to.head<3>() += c * b[3] * a.head<3>();
-          to[3] += c * (a.head<3>().dot(b.head<3>()) - radius * radius * a[3] * b[3]);
-          to[4] += c * a[3] * b[3];
-        }
+  visit_products(patch, [&](std::size_t at, double c, const Vec4& a, const Vec4& b) {
+    const double weight = a[3] * b[3];
+    out.net[at].head<3>() += c * b[3] * a.head<3>();
+    out.net[at][3] += c * (a.head<3>().dot(b.head<3>()) - radius * radius * weight);
+    out.net[at][4] += c * weight;
+  });
+  for (std::size_t at = 0; at < out.net.size(); ++at) out.net[at] /= product_weight(out.m, out.n, at);
   return out;
 }
 

@@ -184,7 +184,7 @@ struct Shape {
   NormalMap normal_map;             // local bounds, for bodies with flats or dents
   DirectionAtlas atlas;
   LazyInnerMap lazy_inner_map;
-  Lazy<NearBall> near_ball;             // balls inside piece by piece, if the body is nearly one
+  Lazy<NearBall> lazy_near_ball;        // balls inside piece by piece, if the body is nearly one
   SupportCells support_cells;           // where the hull's supports lie, near dents
   Ellipsoid ellipsoid;                  // that the body is, if it is one
   Revolution revolution;                // about an axis, if the body is one
@@ -202,6 +202,10 @@ struct Shape {
   // time, before a run: 10 to 100 ms.
   const InnerMap& inner_map() const {
     return lazy_inner_map.get([this] { return make_inner_map(*this); });
+  }
+  // Balls inside it piece by piece, if the body is nearly one. Made the first time, some ms to 30 ms.
+  const NearBall& near_ball() const {
+    return lazy_near_ball.get([this] { return make_near_ball(*this); });
   }
   // Whether a local maximum of d . x may be no global one.
   bool dented() const { return support_excess > kRoundoff * bounding_radius; }

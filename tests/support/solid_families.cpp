@@ -6,13 +6,13 @@
 #include <cmath>
 #include <map>
 
-#include "body/support.h"
 #include "nurbs/affine.h"
 #include "shapes/primitives.h"
 #include "shapes/revolved.h"
 #include "support/bodies.h"
 #include "support/hidden_dents.h"
 #include "support/least_overlap.h"
+#include "support/pairs.h"
 
 namespace nurbs::families {
 
@@ -361,17 +361,9 @@ PairCase nearly_ball_pair(Random& random, long) {
   c.b.x = c.a.x;
   if (random.below(4))
     c.b.x += std::min(1.0, c.b.scale) * random.log_uniform(1e-13, 0.1) * random.direction();
-  const Mat3 to_a = c.a.q.toRotationMatrix().transpose(), to_b = c.b.q.toRotationMatrix().transpose();
-  const auto height = [](const Shape& shape, const Vec3& d) {
-    return find_hull_support(shape, d, nullptr, 1e-14, 1e-14).h;
-  };
   c.truth.known = Known::bound;
-  c.truth.gap = -test::least_overlap(
-      [&](const Vec3& d) {
-        return height(*c.a.shape, to_a * d) + c.b.scale * height(*c.b.shape, to_b * -d) -
-               d.dot(c.b.x - c.a.x);
-      },
-      test::spiral(500), {}, random);
+  c.truth.gap = -test::least_overlap([&](const Vec3& d) { return test::overlap_along(c.a, c.b, d); },
+                                     test::spiral(500), {}, random);
   return c;
 }
 

@@ -31,10 +31,6 @@ constexpr double kNoLength = 1e-100;  // has no direction, its square underflows
 constexpr double kInside = 0.3;       // of the inner radius: where origins lie
 constexpr double kNarrower = 0.5;     // than the cone before, at most
 
-const NearBall& near_ball(const Shape& shape) {
-  return shape.near_ball.get([&] { return make_near_ball(shape); });
-}
-
 // A body's pieces seen from an origin, and those that a pair has made besides.
 class Pieces {
  public:
@@ -100,7 +96,7 @@ struct Cone {
 class NearBallSearch {
  public:
   NearBallSearch(const PairFrame& pair, double tolerance)
-      : pair_(pair), tolerance_(tolerance), a_(near_ball(*pair.a)), b_(near_ball(*pair.b)) {}
+      : pair_(pair), tolerance_(tolerance), a_(pair.a->near_ball()), b_(pair.b->near_ball()) {}
 
   bool run(PolytopeResult* result) {
     evaluate(pair_.offset.norm() > kNoLength ? pair_.offset : Vec3(Vec3::UnitX()), 0);
@@ -251,7 +247,7 @@ class NearBallSearch {
   bool look_along(const Vec3& d) {
     const auto look = [&](const Shape& shape, const Vec3& own, Pieces* pieces) {
       const Vec3 origin =
-          find_hull_support(shape, own, nullptr, tolerance_).point - near_ball(shape).radius * own;
+          find_hull_support(shape, own, nullptr, tolerance_).point - shape.near_ball().radius * own;
       if (!(origin.norm() < kInside * shape.inner_radius)) return false;
       pieces->see_from(origin);
       return true;
@@ -311,7 +307,7 @@ class NearBallSearch {
 }  // namespace
 
 bool are_near_balls(const PairFrame& pair) {
-  return near_ball(*pair.a).found() && near_ball(*pair.b).found();
+  return pair.a->near_ball().found() && pair.b->near_ball().found();
 }
 
 bool search_near_balls(const PairFrame& pair, double tolerance, PolytopeResult* result) {

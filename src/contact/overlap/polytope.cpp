@@ -44,10 +44,6 @@ bool has_rings(const Shape& shape) {
   return revolution_of(shape).found || !shape.round_edges.empty();
 }
 
-bool has_ball_parts(const Shape& shape) {
-  return shape.inner_balls.found();
-}
-
 // What two attempts know together: the narrower one's points, along the direction of the higher lower end.
 PolytopeResult both(const PolytopeResult& x, const PolytopeResult& y, double tolerance) {
   PolytopeResult r = y.bracket.width() < x.bracket.width() ? y : x;
@@ -81,7 +77,7 @@ PolytopeResult solve_polytope(const PairFrame& pair, const Vec3& seed, double to
     return best;
   // Where parts of the bodies are parts of balls, those tell more.
   const bool near = are_near_balls(pair),
-             near_first = near && !has_ball_parts(*pair.a) && !has_ball_parts(*pair.b);
+             near_first = near && !pair.a->inner_balls.found() && !pair.b->inner_balls.found();
   PolytopeResult balls;
   if (near_first) {
     if (search_near_balls(pair, tolerance, &balls)) return balls;
