@@ -25,6 +25,7 @@ namespace nurbs {
 namespace {
 
 constexpr double kGuessAbove = 0.1;    // of the smaller radius: a guess that much above the lowest is none
+constexpr double kDeepGuess = 0.1;     // of it: deeper, what a scan found is not given to Newton
 constexpr double kSameGuess = 0.9995;  // cosine between refined guesses: the atlases tell no more apart
 constexpr double kOnFeature = 0.97;    // cosine between a direction and its support's normal: less on an edge
 constexpr double kRoughSupport = 1e-5;  // of the body, that the supports Newton begins from may lack ...
@@ -240,30 +241,38 @@ class Ladder {
   // The line of centres leads to most contacts, and the certificate says when it did not: then the basins of
   // a scan over all directions, the lowest first, each once. Of bodies with creases or flats only the lowest
   // basin: there Newton seldom finds what it did not at first, and the polytope costs less than a few tries.
-  // Where both bodies are a few points it costs less than the first.
+  // Where both bodies are a few points it costs less than the first; where the overlap is deep Newton proves
+  // one in a hundred of what is scanned.
   ContactResult cold(const PairFrame& pair, double tolerance, int spent) {
     if (of_points(pair, tolerance)) return fallback(pair, nullptr, pair.offset, tolerance, spent);
-    DirectionGuess guesses[kColdGuesses + 1];
-    int found = guess_from_centres(pair, guesses), tried = 0;
     JointSolution best;
     bool have = false;
-    const bool round = pair.a->curvature.min_radius > 0 && pair.b->curvature.min_radius > 0;
-    for (bool scanned = false;;) {
-      for (int k = tried; k < found; ++k) guesses[k] = refine_guess(pair, guesses[k]);
-      const double most = lowest_of(guesses, found).p + (round ? kGuessAbove * pair.size : 0);
-      for (; tried < found; ++tried) {
-        if (scanned && (guesses[tried].p > most || is_known(guesses, tried))) continue;
-        JointSolution joint;
-        if (!polish(pair, guesses[tried], tolerance, &joint, &spent)) continue;
-        if (joint.converged) return finish(pair, joint, joint.normal, Rung::cold, spent);
-        if (!joint.stationary || (have && joint.gap <= best.gap)) continue;
-        best = joint;
-        have = true;
-        if (is_too_deep(joint)) return fallback(pair, &best, joint.normal, tolerance, spent);
+    ContactResult answer;
+    const auto answers = [&](const DirectionGuess& guess) {
+      JointSolution joint;
+      if (!polish(pair, guess, tolerance, &joint, &spent)) return false;
+      if (joint.converged) {
+        answer = finish(pair, joint, joint.normal, Rung::cold, spent);
+        return true;
       }
-      if (scanned) break;
-      found += guess_directions(pair, guesses + found, kColdGuesses);
-      scanned = true;
+      if (!joint.stationary || (have && joint.gap <= best.gap)) return false;
+      best = joint;
+      have = true;
+      if (!is_too_deep(joint)) return false;
+      answer = fallback(pair, &best, joint.normal, tolerance, spent);
+      return true;
+    };
+    DirectionGuess guesses[kColdGuesses + 1];
+    const int first = guess_from_centres(pair, guesses);
+    if (first > 0 && answers(guesses[0] = refine_guess(pair, guesses[0]))) return answer;
+    const int found = first + guess_directions(pair, guesses + first, kColdGuesses);
+    guesses[first] = refine_guess(pair, guesses[first]);
+    if (!(lowest_of(guesses, first + 1).p > kDeepGuess * pair.size)) {
+      for (int k = first + 1; k < found; ++k) guesses[k] = refine_guess(pair, guesses[k]);
+      const bool round = pair.a->curvature.min_radius > 0 && pair.b->curvature.min_radius > 0;
+      const double most = lowest_of(guesses, found).p + (round ? kGuessAbove * pair.size : 0);
+      for (int k = first; k < found; ++k)
+        if (guesses[k].p <= most && !is_known(guesses, k) && answers(guesses[k])) return answer;
     }
     const Vec3 seed = lowest_of(guesses, found).d;
     JointSolution flat;
@@ -327,14 +336,22 @@ class Ladder {
   }
 
   // The polytope brackets the global answer; a stationary point that lies inside its bracket is a better
-  // estimate of points and normal than the polytope's own.
+  // estimate of points and normal than the polytope's own. Before it the search over directions, but with
+  // faces and ruled lines, where that succeeds once in ten times, after it.
   ContactResult bracket(const PairFrame& pair, const JointSolution* known, const Vec3& seed, double tolerance,
                         int spent) {
     JointSolution deep;
     deep.iterations = 0;
     if (known) deep = *known;
-    if ((!known || is_too_deep(*known)) && search_deep(pair, tolerance, &deep) && deep.converged)
+    const bool may_be_other = !known || is_too_deep(*known),
+               faces = !pair.a->flats.empty() || !pair.b->flats.empty();
+    const auto proves = [&] {
+      return may_be_other && search_deep(pair, tolerance, &deep) && deep.converged;
+    };
+    const auto as_deep = [&] {
       return finish(pair, deep, deep.normal, Rung::fallback, spent + deep.iterations);
+    };
+    if (!faces && proves()) return as_deep();
     PolytopeResult hull = solve_polytope(pair, known ? known->normal : seed, tolerance, settings_.reach);
     spent += hull.iterations;
     // Whether a bracket closes that lacks little may depend on where the hull began.
@@ -344,6 +361,7 @@ class Ladder {
       spent += again.iterations;
       if (again.bracket.width() < hull.bracket.width()) hull = again;
     }
+    if (faces && !hull.converged && !(hull.bracket.lower > settings_.reach) && proves()) return as_deep();
     if (hull.converged && (hull.closed || of_points(pair, tolerance))) {
       locate(pair, &hull.points);
       return finish(pair, hull, hull.bracket.direction, Rung::fallback, spent);
