@@ -320,12 +320,13 @@ class Ladder {
   // A bracket that stays open without the inner maps is worth them.
   ContactResult fallback(const PairFrame& pair, const JointSolution* known, const Vec3& seed,
                          double tolerance, int spent) {
-    const ContactResult r = bracket(pair, known, seed, tolerance, spent);
+    SearchedBalls balls;
+    const ContactResult r = bracket(pair, known, seed, tolerance, spent, &balls);
     const LazyInnerMap &a = a_.shape->lazy_inner_map, &b = b_.shape->lazy_inner_map;
     if (r.status != Status::unresolved || (a.made() && b.made())) return r;
     const InnerMap &of_a = a_.shape->inner_map(), &of_b = b_.shape->inner_map();
-    return !of_a.nodes.empty() || !of_b.nodes.empty() ? bracket(pair, known, seed, tolerance, r.iterations)
-                                                      : r;
+    if (of_a.nodes.empty() && of_b.nodes.empty()) return r;
+    return bracket(pair, known, seed, tolerance, r.iterations, &balls);
   }
 
   // The hull's points are where the bodies meet, but its places only have the same supports: for the next
@@ -339,25 +340,25 @@ class Ladder {
   // estimate of points and normal than the polytope's own. Before it the search over directions, but with
   // faces and ruled lines, where that succeeds once in ten times, after it.
   ContactResult bracket(const PairFrame& pair, const JointSolution* known, const Vec3& seed, double tolerance,
-                        int spent) {
+                        int spent, SearchedBalls* balls) {
     JointSolution deep;
     deep.iterations = 0;
     if (known) deep = *known;
     const bool may_be_other = !known || is_too_deep(*known),
                faces = !pair.a->flats.empty() || !pair.b->flats.empty();
-    const auto proves = [&] {
-      return may_be_other && search_deep(pair, tolerance, &deep) && deep.converged;
-    };
+    const auto proves = [&] { return may_be_other && search_deep(pair, tolerance, &deep) && deep.converged; };
     const auto as_deep = [&] {
       return finish(pair, deep, deep.normal, Rung::fallback, spent + deep.iterations);
     };
     if (!faces && proves()) return as_deep();
-    PolytopeResult hull = solve_polytope(pair, known ? known->normal : seed, tolerance, settings_.reach);
+    PolytopeResult hull =
+        solve_polytope(pair, known ? known->normal : seed, tolerance, settings_.reach, balls);
     spent += hull.iterations;
     // Whether a bracket closes that lacks little may depend on where the hull began.
     if (!hull.converged && !(hull.bracket.lower > settings_.reach) &&
         hull.bracket.width() <= kNearlyClosed * tolerance) {
-      const PolytopeResult again = solve_polytope(pair, -hull.bracket.direction, tolerance, settings_.reach);
+      const PolytopeResult again =
+          solve_polytope(pair, -hull.bracket.direction, tolerance, settings_.reach, balls);
       spent += again.iterations;
       if (again.bracket.width() < hull.bracket.width()) hull = again;
     }

@@ -66,7 +66,8 @@ bool search_last(const PairFrame& pair, double tolerance, PolytopeResult* best) 
 
 }  // namespace
 
-PolytopeResult solve_polytope(const PairFrame& pair, const Vec3& seed, double tolerance, double enough) {
+PolytopeResult solve_polytope(const PairFrame& pair, const Vec3& seed, double tolerance, double enough,
+                              SearchedBalls* balls) {
   // A hull that round-off broke (coplanar faces) or that stalled is begun again from other directions, and
   // its vertices moved at random by far more than round-off and far less than the tolerance (Barber, Dobkin &
   // Huhdanpaa 1996, section 4: joggled input); the upper bound allows for it.
@@ -78,10 +79,14 @@ PolytopeResult solve_polytope(const PairFrame& pair, const Vec3& seed, double to
   // Where parts of the bodies are parts of balls, those tell more.
   const bool near = are_near_balls(pair),
              near_first = near && !pair.a->inner_balls.found() && !pair.b->inner_balls.found();
-  PolytopeResult balls;
+  const auto among_balls = [&]() -> const PolytopeResult& {
+    if (!balls->searched) search_near_balls(pair, tolerance, &balls->found);
+    balls->searched = true;
+    return balls->found;
+  };
   if (near_first) {
-    if (search_near_balls(pair, tolerance, &balls)) return balls;
-    upper = std::min(upper, balls.bracket.upper);
+    if (among_balls().converged) return balls->found;
+    upper = std::min(upper, balls->found.bracket.upper);
   }
   Vec3 from = seed;
   bool points = true;
@@ -127,10 +132,7 @@ PolytopeResult solve_polytope(const PairFrame& pair, const Vec3& seed, double to
   }
   if (!best.converged && !(best.bracket.lower > enough) && best.bracket.lower != searched)
     search_last(pair, tolerance, &best);
-  if (near && !best.converged && !(best.bracket.lower > enough)) {
-    if (!near_first) search_near_balls(pair, tolerance, &balls);
-    best = both(best, balls, tolerance);
-  }
+  if (near && !best.converged && !(best.bracket.lower > enough)) best = both(best, among_balls(), tolerance);
   return best;
 }
 

@@ -36,6 +36,13 @@ inline void set_points(const PairFrame& pair, const Vec3& a, const Vec3& b, Poly
   r->points.on_b = find_feature_support(*pair.b, pair.direction_on_b(r->points.na)).where;
 }
 
+// What the search among balls (near_ball_search.h) found of one pair: the same whatever a polytope begins
+// from.
+struct SearchedBalls {
+  bool searched = false;
+  PolytopeResult found;
+};
+
 // Grows a polytope inside the configuration space obstacle A - B (shrunk by a share of the bodies' least
 // curvature radii, which are added back) from exact support points. While the origin is outside, the next
 // direction is that of the polytope's nearest point, as in GJK, and |nearest point| bounds the gap above;
@@ -46,7 +53,13 @@ inline void set_points(const PairFrame& pair, const Vec3& a, const Vec3& b, Poly
 // second order, or by a hull of their own: within an angle of a minimum the inner maps know larger balls than
 // roll all through the bodies, and p(d) - r is the overlap of what is left without those, which bends less.
 // Stops within `tolerance` (a length), when the gap is proven larger than `enough`, or at its caps. Works in
-// fixed-size storage.
-PolytopeResult solve_polytope(const PairFrame& pair, const Vec3& seed, double tolerance, double enough);
+// fixed-size storage. `balls`: of the same pair and tolerance, kept from one call to the next.
+PolytopeResult solve_polytope(const PairFrame& pair, const Vec3& seed, double tolerance, double enough,
+                              SearchedBalls* balls);
+inline PolytopeResult solve_polytope(const PairFrame& pair, const Vec3& seed, double tolerance,
+                                     double enough) {
+  SearchedBalls balls;
+  return solve_polytope(pair, seed, tolerance, enough, &balls);
+}
 
 }  // namespace nurbs
