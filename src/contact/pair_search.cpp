@@ -354,15 +354,15 @@ class Ladder {
     PolytopeResult hull =
         solve_polytope(pair, known ? known->normal : seed, tolerance, settings_.reach, balls);
     spent += hull.iterations;
+    const auto is_open = [&] { return !hull.converged && !(hull.bracket.lower > settings_.reach); };
     // Whether a bracket closes that lacks little may depend on where the hull began.
-    if (!hull.converged && !(hull.bracket.lower > settings_.reach) &&
-        hull.bracket.width() <= kNearlyClosed * tolerance) {
+    if (is_open() && hull.bracket.width() <= kNearlyClosed * tolerance) {
       const PolytopeResult again =
           solve_polytope(pair, -hull.bracket.direction, tolerance, settings_.reach, balls);
       spent += again.iterations;
       if (again.bracket.width() < hull.bracket.width()) hull = again;
     }
-    if (faces && !hull.converged && !(hull.bracket.lower > settings_.reach) && proves()) return as_deep();
+    if (faces && is_open() && proves()) return as_deep();
     if (hull.converged && (hull.closed || of_points(pair, tolerance))) {
       locate(pair, &hull.points);
       return finish(pair, hull, hull.bracket.direction, Rung::fallback, spent);

@@ -80,13 +80,12 @@ PolytopeResult solve_polytope(const PairFrame& pair, const Vec3& seed, double to
   const bool near = are_near_balls(pair),
              near_first = near && !pair.a->inner_balls.found() && !pair.b->inner_balls.found();
   const auto among_balls = [&]() -> const PolytopeResult& {
-    if (!balls->searched) search_near_balls(pair, tolerance, &balls->found);
-    balls->searched = true;
-    return balls->found;
+    if (!*balls) search_near_balls(pair, tolerance, &balls->emplace());
+    return **balls;
   };
   if (near_first) {
-    if (among_balls().converged) return balls->found;
-    upper = std::min(upper, balls->found.bracket.upper);
+    if (among_balls().converged) return among_balls();
+    upper = std::min(upper, among_balls().bracket.upper);
   }
   Vec3 from = seed;
   bool points = true;

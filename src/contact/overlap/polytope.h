@@ -2,6 +2,8 @@
 // corners and vanishing curvature, and brackets the global minimum of p(d) whatever the overlap.
 #pragma once
 
+#include <optional>
+
 #include "contact/certificate.h"
 #include "contact/pair_frame.h"
 
@@ -36,12 +38,9 @@ inline void set_points(const PairFrame& pair, const Vec3& a, const Vec3& b, Poly
   r->points.on_b = find_feature_support(*pair.b, pair.direction_on_b(r->points.na)).where;
 }
 
-// What the search among balls (near_ball_search.h) found of one pair: the same whatever a polytope begins
-// from.
-struct SearchedBalls {
-  bool searched = false;
-  PolytopeResult found;
-};
+// What the search among balls (near_ball_search.h) found of one pair, once it was made: the same whatever a
+// polytope begins from.
+using SearchedBalls = std::optional<PolytopeResult>;
 
 // Grows a polytope inside the configuration space obstacle A - B (shrunk by a share of the bodies' least
 // curvature radii, which are added back) from exact support points. While the origin is outside, the next
