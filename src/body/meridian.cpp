@@ -133,6 +133,17 @@ double difference(const Meridian::Piece& a, const Meridian::Piece& b, bool backw
   return most;
 }
 
+// The ratio of their weights at one control point to that at another, at most.
+double weights_apart(const Meridian::Piece& a, const Meridian::Piece& b, bool backwards) {
+  double least = kFarAway, most = 0;
+  for (int i = 0; i <= a.degree; ++i) {
+    const double ratio = a.w[i] / b.w[backwards ? b.degree - i : i];
+    least = std::min(least, ratio);
+    most = std::max(most, ratio);
+  }
+  return most / least;
+}
+
 // Control points of the line at an end of a patch's arcs, along the piece.
 std::vector<Vec4> line_at_end(const Meridian::Sector& s, const BezierPatch& patch, bool last) {
   const int n = s.arcs_in_u ? patch.degree_v : patch.degree_u, i = last ? s.degree : 0;
@@ -385,8 +396,12 @@ ProfilePoint profile_point(const Meridian& m, const Meridian::Place& place, doub
 
 Ripple ripple_at(const Meridian::Piece& piece, double t) {
   Ripple r;
-  for (int j = 0; j <= piece.degree; ++j)
-    r.add(binomial(piece.degree, j) * std::pow(t, j) * std::pow(1 - t, piece.degree - j), piece.ripple[j]);
+  double share[kMaxDegree + 1], sum = 0;
+  for (int j = 0; j <= piece.degree; ++j) {
+    share[j] = binomial(piece.degree, j) * std::pow(t, j) * std::pow(1 - t, piece.degree - j) * piece.w[j];
+    sum += share[j];
+  }
+  for (int j = 0; j <= piece.degree; ++j) r.add(share[j] / sum, piece.ripple[j]);
   return r;
 }
 
@@ -490,7 +505,8 @@ Meridian make_meridian(const std::vector<BezierPatch>& patches, const Revolution
       mine = &all.back();
     }
     if (sector.backwards) std::reverse(piece.ripple.begin(), piece.ripple.end());
-    for (size_t k = 0; k < piece.ripple.size(); ++k) mine->piece.ripple[k].include(piece.ripple[k]);
+    const double apart = weights_apart(mine->piece, piece, sector.backwards);
+    for (size_t k = 0; k < piece.ripple.size(); ++k) mine->piece.ripple[k].include(piece.ripple[k], apart);
     for (const Ripple& r : piece.ripple) m.ripple.include(r);
     mine->sectors.push_back(sector);
   }

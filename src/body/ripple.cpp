@@ -3,6 +3,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
+#include <optional>
+#include <utility>
 
 #include "nurbs/bernstein.h"
 #include "nurbs/tolerances.h"
@@ -12,6 +15,11 @@ namespace {
 
 using Real = ArcNet::Real;
 using Row = std::vector<Real>;
+using Vector = Eigen::Matrix<Real, 3, 1>;
+using Number = Eigen::Matrix<Real, 1, 1>;
+
+constexpr int kArcHalvings = 3;
+constexpr double kSlack = 1.01;  // of the product's circles, which are nearly that
 
 Row times(const Row& a, const Row& b) {
   return multiply(a, b, [](Real x, Real y) { return x * y; });
@@ -104,58 +112,131 @@ Most along_arc(const ArcNet& net, int j, const Value& value) {
   return m;
 }
 
+// A net, the product near it and their arc, or a part of all three along the arc.
+struct Lines {
+  ArcNet net, product;
+  UnitArc arc;
+
+  // Each line round the axis divided by the profile's weight there.
+  void normalise() {
+    for (int j = 0; j <= net.profile; ++j) {
+      const Real factor = arc.w[0] / product.at(0, j)[3];
+      for (int i = 0; i <= net.arc; ++i)
+        for (ArcNet* of : {&net, &product})
+          of->points[static_cast<size_t>(i) * (net.profile + 1) + j] *= factor;
+    }
+  }
+  // Keeps the first half; the second one.
+  Lines halve() {
+    Lines second(*this);
+    for (const auto& [of, to] : {std::pair(&net, &second.net), std::pair(&product, &second.product)})
+      halve_net(of->points.data(), to->points.data(), of->arc, of->profile, true);
+    for (const auto& [of, to] : {std::pair(&arc.x, &second.arc.x), std::pair(&arc.y, &second.arc.y),
+                                 std::pair(&arc.w, &second.arc.w)})
+      halve_row(of->data(), to->data(), net.arc, 1);
+    return second;
+  }
+
+  Vector points_off(int i, int j) const { return (net.at(i, j) - product.at(i, j)).template head<3>(); }
+  Number weights_off(int i, int j) const { return Number(net.at(i, j)[3] - product.at(i, j)[3]); }
+  Number weights(int i, int j) const { return Number(net.at(i, j)[3]); }
+};
+
+// The least weight, and how far a control point is from the axis point at most.
+struct Extent {
+  Real least_weight = std::numeric_limits<Real>::infinity(), furthest = 0;
+  explicit Extent(const ArcNet& net) {
+    for (const ArcNet::Point& p : net.points) {
+      least_weight = std::min(least_weight, p[3]);
+      furthest = std::max<Real>(furthest, p.head<3>().norm() / p[3]);
+    }
+  }
+};
+
+// By how much the arc's radius, the root of 1 + g, is off 1; nothing where that is not little. `by`: null for
+// the function alone.
+std::optional<Most> radius_off(const UnitArc& arc, const ByAzimuth* by) {
+  const Row square = square_of(arc), w2 = times(arc.w, arc.w);
+  if (!(least(w2) > 0)) return {};
+  Most g = most_of(difference(square, w2)) * inverse(most_of(w2), least(w2));
+  if (by) g = by->of(g);
+  if (!(g.f < 0.01)) return {};
+  return Most{0.51L * g.f, 0.51L * g.f1, 0.51L * g.f2 + 0.26L * g.f1 * g.f1};
+}
+
+// What the lines round the axis are off the product's, `along` left out.
+bool include_rows(const Lines& l, std::vector<Ripple>* rows) {
+  ByAzimuth by;
+  if (!by_azimuth(l.arc, square_of(l.arc), &by)) return false;
+  const std::optional<Most> radius = radius_off(l.arc, &by);
+  const Extent extent(l.net);
+  if (!radius || !(extent.least_weight > 0)) return false;
+  const auto points_off = [&](int i, int j) { return l.points_off(i, j); };
+  const auto weights_off = [&](int i, int j) { return l.weights_off(i, j); };
+  const auto weights = [&](int i, int j) { return l.weights(i, j); };
+  // P - P0 = (a - P0 b) / w, with what the nets differ by, a and, of weights, b. P0 runs round circles.
+  Most w;
+  for (int j = 0; j <= l.net.profile; ++j) w.include(by.of(along_arc(l.net, j, weights)));
+  const Most over = inverse(w, extent.least_weight);
+  const Real round = kSlack * extent.furthest;
+  for (int j = 0; j <= l.net.profile; ++j) {
+    const Most a = by.of(along_arc(l.net, j, points_off)), b = by.of(along_arc(l.net, j, weights_off)),
+               off = (a + Most{round, round, round} * b) * over;
+    Real wide = 0;
+    for (int i = 0; i <= l.net.arc; ++i)
+      wide = std::max<Real>(wide, l.net.at(i, j).head<2>().norm() / extent.least_weight);
+    wide *= kSlack;
+    // In the turning half plane.
+    (*rows)[j].include({static_cast<double>(off.f + wide * radius->f),
+                        static_cast<double>(off.f1 + off.f + wide * radius->f1),
+                        static_cast<double>(off.f2 + 2 * off.f1 + off.f + wide * radius->f2), 0});
+  }
+  return true;
+}
+
+// In parts of the arc: over short ones a bound is not far from what it bounds.
+bool include_rows(Lines first, int halvings, std::vector<Ripple>* rows) {
+  if (halvings == 0) return include_rows(first, rows);
+  Lines second = first.halve();
+  return include_rows(std::move(first), halvings - 1, rows) &&
+         include_rows(std::move(second), halvings - 1, rows);
+}
+
+// What the ripple changes by along the profile.
+double ripple_along(const Lines& l, double speed, Real radius_off) {
+  const Extent extent(l.net);
+  const auto points_off = [&](int i, int j) { return l.points_off(i, j); };
+  const auto weights_off = [&](int i, int j) { return l.weights_off(i, j); };
+  const auto weights = [&](int i, int j) { return l.weights(i, j); };
+  const Real round = kSlack * extent.furthest;
+  Real most_top = 0, most_off = 0;
+  for (int j = 0; j <= l.net.profile; ++j) {
+    const Real off = along_arc(l.net, j, weights_off).f;
+    most_top = std::max(most_top, along_arc(l.net, j, points_off).f + round * off);
+    most_off = std::max(most_off, off);
+  }
+  const Real top_along = along_profile(l.net, points_off) + kSlack * speed * most_off +
+                         round * along_profile(l.net, weights_off),
+             along = (top_along + most_top * along_profile(l.net, weights) / extent.least_weight) /
+                     extent.least_weight;
+  return static_cast<double>(along + kSlack * speed * radius_off);
+}
+
 }  // namespace
 
 std::vector<Ripple> ripple_of(const ArcNet& net, const ArcNet& product, const UnitArc& arc, double speed) {
-  constexpr double kSlack = 1.01;  // of the product's circles, which are nearly that
-  ByAzimuth by;
-  const Row square = square_of(arc), w2 = times(arc.w, arc.w);
-  if (net.arc < 2 || !by_azimuth(arc, square, &by)) return {};
-  using Vector = Eigen::Matrix<Real, 3, 1>;
-  using Number = Eigen::Matrix<Real, 1, 1>;
-  Real least_weight = net.at(0, 0)[3], furthest = 0;
-  for (const ArcNet::Point& p : net.points) {
-    if (!(p[3] > 0)) return {};
-    least_weight = std::min(least_weight, p[3]);
-    furthest = std::max<Real>(furthest, p.head<3>().norm() / p[3]);
-  }
-  // P - P0 = (a - P0 b) / w, with what the nets differ by, a and, of weights, b. P0 runs round circles.
-  const auto points_off = [&](int i, int j) -> Vector {
-    return (net.at(i, j) - product.at(i, j)).template head<3>();
-  };
-  const auto weights_off = [&](int i, int j) -> Number {
-    return Number(net.at(i, j)[3] - product.at(i, j)[3]);
-  };
-  const auto weights = [&](int i, int j) -> Number { return Number(net.at(i, j)[3]); };
-  Most w;
-  for (int j = 0; j <= net.profile; ++j) w.include(by.of(along_arc(net, j, weights)));
-  const Most over = inverse(w, least_weight);
-  const Real round = kSlack * furthest;
-  // The arc's own radius is the root of 1 + g.
-  if (!(least(w2) > 0)) return {};
-  const Most g = by.of(most_of(difference(square, w2)) * inverse(most_of(w2), least(w2)));
-  if (!(g.f < 0.01)) return {};
-  const Most radius{0.51L * g.f, 0.51L * g.f1, 0.51L * g.f2 + 0.26L * g.f1 * g.f1};
-  Real most_top = 0, most_off = 0;
-  std::vector<Ripple> rows;
-  for (int j = 0; j <= net.profile; ++j) {
-    const Most a = by.of(along_arc(net, j, points_off)), b = by.of(along_arc(net, j, weights_off)),
-               top = a + Most{round, round, round} * b, off = top * over;
-    Real wide = 0;
-    for (int i = 0; i <= net.arc; ++i)
-      wide = std::max<Real>(wide, net.at(i, j).head<2>().norm() / least_weight);
-    wide *= kSlack;
-    most_top = std::max(most_top, top.f);
-    most_off = std::max(most_off, b.f);
-    // In the turning half plane.
-    rows.push_back({static_cast<double>(off.f + wide * radius.f),
-                    static_cast<double>(off.f1 + off.f + wide * radius.f1),
-                    static_cast<double>(off.f2 + 2 * off.f1 + off.f + wide * radius.f2), 0});
-  }
-  const Real top_along = along_profile(net, points_off) + kSlack * speed * most_off +
-                         round * along_profile(net, weights_off),
-             along = (top_along + most_top * along_profile(net, weights) / least_weight) / least_weight;
-  for (Ripple& r : rows) r.along = static_cast<double>(along + kSlack * speed * radius.f);
+  const auto heavy = [](const ArcNet::Point& p) { return p[3] > 0; };
+  if (net.arc < 2 || !std::all_of(net.points.begin(), net.points.end(), heavy) ||
+      !std::all_of(product.points.begin(), product.points.end(), heavy))
+    return {};
+  Lines lines{net, product, arc};
+  const std::optional<Most> radius = radius_off(arc, nullptr);
+  if (!radius) return {};
+  const double along = ripple_along(lines, speed, radius->f);
+  lines.normalise();
+  std::vector<Ripple> rows(static_cast<size_t>(net.profile) + 1);
+  if (!include_rows(std::move(lines), kArcHalvings, &rows)) return {};
+  for (Ripple& r : rows) r.along = along;
   return rows;
 }
 

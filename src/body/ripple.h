@@ -28,11 +28,11 @@ struct Ripple {
   double bend = 0;   // ... and its second
   double along = 0;  // its first derivative by the profile's parameter, at most
 
-  void include(const Ripple& other) {
-    most = std::max(most, other.most);
-    slope = std::max(slope, other.slope);
-    bend = std::max(bend, other.bend);
-    along = std::max(along, other.along);
+  void include(const Ripple& other, double factor = 1) {
+    most = std::max(most, factor * other.most);
+    slope = std::max(slope, factor * other.slope);
+    bend = std::max(bend, factor * other.bend);
+    along = std::max(along, factor * other.along);
   }
   void add(double factor, const Ripple& other) {
     most += factor * other.most;
@@ -54,8 +54,8 @@ struct UnitArc {
 
 // Of a net, and the product near it of the arc and a profile, of speed `speed` at most: for each of the
 // profile's control points its share, so that at a parameter the ripple is no more than their mean by the
-// Bernstein polynomials there (near a tip it is small). Proven from coefficients; none where the arc is not
-// proven to go round one way.
+// rational Bernstein polynomials there (near a tip it is small). Proven from coefficients of parts of the
+// arc; none where that is not proven to go round one way.
 std::vector<Ripple> ripple_of(const ArcNet& net, const ArcNet& product, const UnitArc& arc, double speed);
 
 }  // namespace nurbs

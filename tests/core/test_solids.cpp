@@ -572,49 +572,81 @@ TEST(SavedCases, corners_that_are_straight) {
   EXPECT_GT(straight, 0);
 }
 
+// Whether an answer closes for bodies that overlap, about an axis the least; what a search finds, about the
+// axis and elsewhere, is no less than it says.
+bool closes_about(const Vec3& axis, const Particle& a, const Particle& b, Random& random) {
+  double memory[kPairMemorySize] = {0};
+  ContactSettings settings;
+  settings.tolerance = 1e-9;
+  const ContactResult r = find_contact(a, b, settings, memory);
+  const auto overlap = [&](const Vec3& d) { return test::overlap_along(a, b, d); };
+  std::vector<Vec3> starts = test::spiral(300);
+  for (int k = 0; k < 64; ++k) starts.push_back(Eigen::AngleAxisd(M_PI / 32 * k, axis) * r.normal);
+  const double least = test::least_overlap(overlap, starts, test::Compass(), random);
+  EXPECT_LE(-r.upper - least, 1e-12);
+  EXPECT_NEAR(overlap(r.normal), -r.gap, 2e-9);
+  return r.status == Status::converged;
+}
+
+// A body of revolution by a file of few digits, and its axis.
+struct Rippled {
+  std::shared_ptr<const Shape> shape;
+  Vec3 axis;
+  Rippled(const std::vector<NurbsSurface>& surfaces, int decimals)
+      : shape(make_shape("rippled", test::with_decimals(surfaces, decimals))) {
+    EXPECT_TRUE(shape->near_revolution.found()) << decimals;
+    shape->inner_map();
+    axis = shape->near_revolution.revolution.axis;
+  }
+};
+
 // Tip on tip the least overlap is nearly the same all round the axis; of few digits, which keep the bodies
 // from being ones of revolution, it was left open by up to 4e-5, where 15 digits closed it.
 TEST(Solids, tips_of_few_digits_close) {
   Random random(21);
   struct Case {
     std::vector<NurbsSurface> surfaces;
-    int closes;  // with so many decimals
+    int decimals;  // that it closes with, and more
   };
   const Case cases[] = {{test::double_cone(random, 1, 0.8, 0.8).shape->surfaces, 8},
-                        {test::lens(random, 1.2).shape->surfaces, 8},
-                        {test::capsule(random, 0.4, 0.5).shape->surfaces, 9}};
-  for (const int decimals : {9, 8, 7})
+                        {test::lens(random, 1.2).shape->surfaces, 6},
+                        {test::capsule(random, 0.4, 0.5).shape->surfaces, 8}};
+  for (const int decimals : {9, 8, 7, 6})
     for (const Case& c : cases) {
-      const auto body = make_shape("rounded", test::with_decimals(c.surfaces, decimals));
-      ASSERT_TRUE(body->near_revolution.found()) << decimals;
-      body->inner_map();
-      const Vec3 axis = body->near_revolution.revolution.axis;
+      const Rippled body(c.surfaces, decimals);
       for (const double overlap : {1e-5, 1e-3, 0.1, 0.7}) {
-        PairCase pair;
-        pair.a = {body.get(), 1, Vec3::Zero(), random.turn()};
-        pair.b = {body.get(), 1, Vec3::Zero(), random.turn_by(random.log_uniform(1e-12, 1e-3)) * pair.a.q};
-        pair.b.q.normalize();
-        const Vec3 along = pair.a.q * axis;
-        const double apart = test::overlap_along(pair.a, pair.b, along);
-        pair.b.x = (apart - overlap) * along;
-        double memory[kPairMemorySize] = {0};
-        ContactSettings settings;
-        settings.tolerance = 1e-9;
-        const ContactResult r = find_contact(pair.a, pair.b, settings, memory);
-        if (decimals >= c.closes) {
-          EXPECT_EQ(r.status, Status::converged) << decimals << " " << overlap;
-        }
-        // What a search finds, about the axis and elsewhere, is no less.
-        std::vector<Vec3> starts = test::spiral(300);
-        for (int k = 0; k < 64; ++k) starts.push_back(Eigen::AngleAxisd(M_PI / 32 * k, along) * r.normal);
-        const double least =
-            test::least_overlap([&](const Vec3& d) { return test::overlap_along(pair.a, pair.b, d); }, starts,
-                                test::Compass(), random);
-        EXPECT_LE(-r.upper - least, 1e-12) << decimals << " " << overlap;
-        EXPECT_NEAR(test::overlap_along(pair.a, pair.b, r.normal), -r.gap, 2e-9)
-            << decimals << " " << overlap;
+        SCOPED_TRACE(std::to_string(decimals) + " decimals, " + std::to_string(overlap));
+        const Particle a{body.shape.get(), 1, Vec3::Zero(), random.turn()};
+        Particle b{body.shape.get(), 1, Vec3::Zero(), random.turn_by(random.log_uniform(1e-12, 1e-3)) * a.q};
+        b.q.normalize();
+        const Vec3 along = a.q * body.axis;
+        b.x = (test::overlap_along(a, b, along) - overlap) * along;
+        const bool closes = closes_about(along, a, b, random);
+        EXPECT_TRUE(closes || decimals < c.decimals);
       }
     }
+}
+
+// Unlike ones, one in the other or nearly so, on one axis. Such pairs, one in thirty of random ones at 7
+// decimals, were open by 1e-5 to 1e-3 before what few digits bend was bounded part by part.
+TEST(Solids, unlike_bodies_of_few_digits_close_on_one_axis) {
+  Random random(22);
+  int open = 0;
+  const std::vector<NurbsSurface> solids[] = {
+      test::cone(random, 1.5, 1).shape->surfaces, test::double_cone(random, 1, 0.4, 0.8).shape->surfaces,
+      egg(1, 0.8, 1.5), test::capsule(random, 0.5, 0.3).shape->surfaces};
+  for (const int decimals : {8, 7, 6, 5})
+    for (int k = 0; k < 4; ++k) {
+      const Rippled of_a(solids[k], decimals), of_b(solids[(k + 1) % 4], decimals);
+      SCOPED_TRACE(std::to_string(decimals) + " decimals, " + std::to_string(k));
+      const Particle a{of_a.shape.get(), 1, Vec3::Zero(), random.turn()};
+      const Vec3 along = a.q * of_a.axis;
+      Particle b{of_b.shape.get(), random.uniform(0.3, 0.8), random.uniform(-0.3, 0.3) * along,
+                 Quat::FromTwoVectors(of_b.axis, random.sign() * along)};
+      b.q = (random.turn_by(1e-7) * b.q).normalized();
+      open += !closes_about(along, a, b, random);
+    }
+  EXPECT_LE(open, 1) << "of 16";
 }
 
 // Refused as dented by a sixth of their size: a fillet a few thousand digits wide ends at an angle to the

@@ -10,6 +10,7 @@ constexpr double kChord = 1.05;         // up to 0.5 rad: no less than the angle
 constexpr double kWidestSecond = 0.88;  // cosine of that
 constexpr double kOffRipple = 3;        // times the most it is off by, a circle is known all round
 constexpr double kRippleShare = 0.2;    // of the tolerance, up to which rippled circles are followed anyway
+constexpr double kNextFar = 1e-3;       // sine between the angles of rippled circles that are not
 constexpr double kSteepSine = 0.02;     // up to which lengths are taken off radii instead
 
 double square(double x) {
@@ -46,7 +47,13 @@ double meridian_bend(const Shape& shape, const Vec3& e, const Vec3& axis, double
 }  // namespace
 
 double RingSectors::turn_to(const Sector& sector, const Wave& w) {
-  return std::remainder(sector.phi - w.phi, 2 * M_PI);
+  const double turn = sector.phi - w.phi;
+  return turn - 2 * M_PI * std::nearbyint(turn * (0.5 / M_PI));
+}
+
+Angle RingSectors::near_of(const Wave& w) const {
+  const double turn = std::min(M_PI_2, std::sqrt(2 * kRippleShare * tolerance_ / w.ripple.bend));
+  return w.ripple.bend > 0 ? Angle{std::cos(turn), std::sin(turn)} : Angle{0, 1};
 }
 
 void RingSectors::choose(const Sector& sector, double half) {
@@ -56,11 +63,10 @@ void RingSectors::choose(const Sector& sector, double half) {
              last = static_cast<int>(std::lower_bound(begin, end, sector.high, before) - begin);
   const double reach = std::max(kNearAzimuth, 2 * half);
   const Angle& u = sector.u;
+  const bool wide = 2 * half > M_PI_2;
+  const Angle twice{std::cos(2 * half), std::sin(2 * half)};
   const auto near = [&](const FlatCircle& c) {
-    if (view_.rippled()) {
-      const double beyond = std::abs(turn_to(sector, c.wave)) - 2 * half;
-      return !(beyond > 0) || c.wave.ripple.bend * beyond * beyond <= 2 * kRippleShare * tolerance_;
-    }
+    if (view_.rippled()) return wide || c.u.c * u.c + c.u.s * u.s >= twice.c * c.near.c - twice.s * c.near.s;
     return (view_.circles && !c.lone) || reach > 1 || c.at.s == 0 ||
            2 - 2 * (c.u.c * u.c + c.u.s * u.s) <= square(reach);
   };
@@ -70,7 +76,13 @@ void RingSectors::choose(const Sector& sector, double half) {
     if (counts || first - i <= kBeside) which_[chosen_++] = order_[i];
     beside += counts;
   }
-  for (int i = first; i < last; ++i) which_[chosen_++] = order_[i];
+  const FlatCircle* before_it = nullptr;  // of those far off one an angle tells as much as all
+  for (int i = first; i < last; ++i) {
+    const FlatCircle& c = flat_[order_[i]];
+    if (view_.rippled() && before_it && !(cross(before_it->at, c.at) > kNextFar) && !near(c)) continue;
+    which_[chosen_++] = order_[i];
+    before_it = &c;
+  }
   for (int i = last, beside = 0; i < count_ && beside < kBeside; ++i) {
     const bool counts = near(flat_[order_[i]]);
     if (counts || i - last < kBeside) which_[chosen_++] = order_[i];
@@ -109,18 +121,18 @@ RingSectors::Drift RingSectors::drift(const Wave& w, const Angle& at, const Sect
   if (!view_.rippled()) return {};
   Drift d{false, turn_to(sector, w), kOffRipple * w.ripple.most};
   double furthest = std::abs(d.turn) + half, tilted = 0;
+  if (w.before < 0 || !(0.5 * w.ripple.bend * square(furthest) < d.lost)) return d;
   if (view_.near_m && view_.tilt > 0) {
     if (!(over.across > 0)) return d;
     double chord = 0;
     for (const Angle& a : {sector.low, sector.high})
-      chord = std::max(chord, std::hypot(a.c - at.c, a.s - at.s));
-    tilted = view_.tilt / over.across * (furthest + M_PI_2 * chord);
+      chord = std::max(chord, square(a.c - at.c) + square(a.s - at.s));
+    tilted = view_.tilt / over.across * (furthest + M_PI_2 * std::sqrt(chord));
     furthest += tilted;
   }
-  if (w.before < 0) return d;
   const double beyond = std::max({0.0, half + tilted - d.turn - w.before, d.turn + half + tilted - w.after});
-  double lost = 0.5 * w.ripple.bend * square(furthest) + w.steep() * tilted;
-  if (beyond > 0) lost += (w.ripple.slope + w.steep()) * beyond + view_.seam;
+  double lost = 0.5 * w.ripple.bend * square(furthest) + w.steep * tilted;
+  if (beyond > 0) lost += (w.ripple.slope + w.steep) * beyond + view_.seam;
   if (!(lost < d.lost)) return d;
   d.followed = true;
   d.lost = lost;
@@ -167,7 +179,7 @@ void RingSectors::project(const Sector& sector, double half) {
       z += drift.turn * (c.wave.k_z - c.wave.m_z * b[2]);
       rm += drift.turn * c.wave.m_r;
     }
-    double most = drift.lost + (drift.followed ? half * c.wave.steep() : 0);
+    double most = drift.lost + (drift.followed ? half * c.wave.steep : 0);
     if (rm < 0) most -= rm;  // beyond the axis
     if (rm > 0) {
       const Facing m = facing(c.at, b);
@@ -315,7 +327,7 @@ double RingSectors::second_order(const Sector& sector, const Least& here, bool* 
     rippled = std::max(rippled, drift.lost);
     *wave_slope = 0;
     if (drift.followed) {
-      steep = std::max(steep, w.steep());
+      steep = std::max(steep, w.steep);
       *wave_slope = s * w.k_r + c * w.k_z + m.sine * w.m_r - w.m_z * (s * b[0] + c * b[2]);
       follow(w, drift.turn, &circle);
     }

@@ -22,10 +22,13 @@ constexpr double kMeridianShare = 0.4;  // ... and below which its width, not it
 constexpr double kLeastTilt = 3e-3;     // sine between the axes from which the mate's tip may do better
 constexpr double kCoreDepth = 0.98;     // ... and of the overlap
 constexpr int kFirstAngles = 7;
-constexpr int kRippledCost = 3;       // sectors, as one of rippled circles, ...
-constexpr double kFollowedCost = 25;  // ... besides one for so many that are followed
-constexpr double kOnPaceRippled = 3;
+constexpr int kRippledCost = 3;        // sectors, as one of rippled circles, ...
+constexpr double kFollowedCost = 25;   // ... besides one for so many that are followed
+constexpr double kOnPaceRippled = 10;  // kOnPace ...
+constexpr double kFirstSpentRippled =
+    1;                                // ... and kFirstSpent of those, of which one tells little of the next
 constexpr double kSameAngle = 1e-13;  // rad
+constexpr SurfacePoint kAnywhere{-1, 0, 0};
 
 }  // namespace
 
@@ -50,8 +53,6 @@ bool RingSectors::run(bool last, double* left, PolytopeResult* result) {
   best_e_ = e;
   if (!(best_ > tolerance_ && noise_ <= kMostNoise * tolerance_) || !query(e)) return false;
   choose_mate(e);
-  on_k_ = last_k_;
-  on_m_ = last_m_;
   const double alike = differ() / (view_.scale_k * view_.k->bounding_radius);
   if (!(alike < (last ? kHardlyAlike : kNearlyAlike))) return false;
   if (last && view_.rippled() && alike < kNearlyAlike) return false;  // tried
@@ -89,22 +90,48 @@ void RingSectors::choose_mate(const Vec3& e) {
   query(e);
 }
 
+// Of a rippled body any parameter line's point says of all directions what it says: its support is only worth
+// finding where the bodies may overlap less than has been seen.
 bool RingSectors::query(const Vec3& e) {
   if (count_ == kMostCircles) return false;
-  const double enough = kSupportShare * tolerance_;
-  const Support k = find_hull_support(*view_.k, view_.turn_k.transpose() * e, nullptr, enough / view_.scale_k,
-                                      kHullSlope),
-                m = find_hull_support(*view_.m, view_.turn_m.transpose() * -e, nullptr,
-                                      enough / view_.scale_m, kHullSlope);
   ++queries_;
+  const Vec3 own_k = view_.turn_k.transpose() * e, own_m = view_.turn_m.transpose() * -e;
+  std::optional<Support> k, m;
+  const auto support = [&](const Shape& shape, double scale, const Vec3& own) {
+    return find_hull_support(shape, own, nullptr, kSupportShare * tolerance_ / scale, kHullSlope);
+  };
+  Line line_k{}, line_m{};
+  const auto find_lines = [&](const SurfacePoint& on_k, const SurfacePoint& on_m) {
+    if (view_.near_k) line_k = line_of(*view_.k, view_.scale_k, view_.turn_k, e, on_k);
+    if (view_.near_m) line_m = line_of(*view_.m, view_.scale_m, view_.turn_m, -e, on_m);
+  };
+  find_lines(kAnywhere, kAnywhere);
+  if (!line_k.known) k = support(*view_.k, view_.scale_k, own_k);
+  if (!line_m.known) m = support(*view_.m, view_.scale_m, own_m);
+  const auto overlap = [&] {
+    return (k ? view_.scale_k * k->upper : e.dot(line_k.at)) +
+           (m ? view_.scale_m * m->upper : -e.dot(line_m.at)) - balls() - e.dot(view_.offset);
+  };
+  if (overlap() < best_ || count_ == 0) {
+    if (!k) k = support(*view_.k, view_.scale_k, own_k);
+    if (!m) m = support(*view_.m, view_.scale_m, own_m);
+    const double p = overlap();
+    if (p < best_) {
+      best_ = p;
+      best_e_ = e;
+    }
+    if (p == best_ || count_ == 0) {
+      on_k_ = k->where;
+      on_m_ = m->where;
+    }
+    find_lines(k->where, m->where);  // along a straight profile any place is as good as another, but for this
+  }
   Circle c;
-  const Line line_k = view_.near_k ? line_of(*view_.k, view_.scale_k, view_.turn_k, e, k.where) : Line{},
-             line_m = view_.near_m ? line_of(*view_.m, view_.scale_m, view_.turn_m, -e, m.where) : Line{};
   const Vec3 x = line_k.known ? line_k.at
-                              : view_.turn_k * (view_.scale_k * k.point - view_.ball_k * k.normal),
-             xm = line_m.known ? line_m.at : view_.turn_m * mate_core(m, view_.turn_m.transpose() * -e);
-  c.nk = line_k.known ? line_k.normal : view_.turn_k * k.normal;
-  c.nm = -(line_m.known ? line_m.normal : view_.turn_m * m.normal);
+                              : view_.turn_k * (view_.scale_k * k->point - view_.ball_k * k->normal),
+             xm = line_m.known ? line_m.at : view_.turn_m * mate_core(*m, own_m);
+  c.nk = line_k.known ? line_k.normal : view_.turn_k * k->normal;
+  c.nm = -(line_m.known ? line_m.normal : view_.turn_m * m->normal);
   c.place_k = line_k.on.profile.place;
   c.place_m = line_m.on.profile.place;
   c.on_k = x - view_.point;
@@ -122,19 +149,9 @@ bool RingSectors::query(const Vec3& e) {
   c.k = view_.offset - view_.point + c.middle;
   const double around = c.at.s > 0 ? 1 / c.at.s : 0;
   const Angle u{around * tangent_.dot(e), around * second_.dot(e)};
-  flat_[count_] = {
-      c.at, u, c.rm, c.lone, flat(c.r, c.z, c.k), flat(0, 0, c.k - c.on_k), wave(e, line_k, line_m)};
+  const Wave wave = this->wave(e, line_k, line_m);
+  flat_[count_] = {c.at, u, c.rm, c.lone, flat(c.r, c.z, c.k), flat(0, 0, c.k - c.on_k), wave, near_of(wave)};
   insert(c);
-  const double p = view_.scale_k * k.upper + view_.scale_m * m.upper - balls() - e.dot(view_.offset);
-  last_ = p;
-  last_k_ = k.where;
-  last_m_ = m.where;
-  if (p < best_) {
-    best_ = p;
-    best_e_ = e;
-    on_k_ = last_k_;
-    on_m_ = last_m_;
-  }
   return true;
 }
 
@@ -174,6 +191,7 @@ RingSectors::Wave RingSectors::wave(const Vec3& e, const Line& k, const Line& m)
     wave.reach(against ? m.on.after : m.on.before, against ? m.on.before : m.on.after);
     wave.ripple.add(view_.scale_m, m.on.ripple);
   }
+  wave.steep = std::hypot(wave.k_r, wave.k_z) + std::hypot(wave.m_r, wave.m_z);
   return wave;
 }
 
@@ -232,7 +250,9 @@ bool RingSectors::close(const Sector& all, bool last, double* left) {
   const bool ample = last || view_.rippled();  // which are tried but once
   const double most_spent = ample ? kMostSpentLast : kMostSpent,
                most_compared = ample ? kMostComparedLast : kMostCompared,
-               first_spent = ample ? kFirstSpentLast : kFirstSpent;
+               first_spent = view_.rippled() ? kFirstSpentRippled
+                             : last          ? kFirstSpentLast
+                                             : kFirstSpent;
   Sector stack[kDeepestSector + 2];
   int top = 0, sectors = 0;
   double closed = 0;

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 
 #include "contact/overlap/half_plane_hull.h"
 #include "contact/overlap/polytope.h"
@@ -42,8 +43,8 @@ class RingSectors {
   // their radius and the height over M's centre. One patch each from `before` to `after` (rad, not negative).
   struct Wave {
     double phi = 0, k_r = 0, k_z = 0, m_r = 0, m_z = 0, before = -1, after = -1;
-    Ripple ripple;  // of both bodies' lines
-    double steep() const { return std::hypot(k_r, k_z) + std::hypot(m_r, m_z); }
+    double steep = 0;  // all of them, at most
+    Ripple ripple;     // of both bodies' lines
     void reach(double low, double high) {
       before = std::min(before, low);
       after = std::min(after, high);
@@ -62,6 +63,7 @@ class RingSectors {
     bool lone;
     Flat whole, alone;  // as a circle, and as its point
     Wave wave;
+    Angle near;  // how far from where it was asked for the ripple hardly tells
   };
 
   struct Sector {
@@ -117,6 +119,7 @@ class RingSectors {
   void witness(int k, const Sector& there, Vec3* on_k, Vec3* on_m) const;
 
   // The bounds.
+  Angle near_of(const Wave& w) const;
   // To a sector's middle from where a circle was asked for, rad.
   static double turn_to(const Sector& sector, const Wave& w);
   // The order of circles is that of the angles they were asked for. Chosen are those asked for in a sector,
@@ -165,9 +168,9 @@ class RingSectors {
   const double tolerance_;
   Vec3 tangent_, second_;  // square to the axis
   double noise_;
-  double best_ = kFarAway, proven_ = kFarAway, last_ = 0;
+  double best_ = kFarAway, proven_ = kFarAway;
   Vec3 best_e_ = Vec3::UnitX();
-  SurfacePoint on_k_, on_m_, last_k_, last_m_;
+  SurfacePoint on_k_, on_m_;
   int count_ = 0, dropped_ = 0, queries_ = 0;
   long compared_ = 0;  // circles, in plane hulls
   long followed_ = 0;  // rippled ones
