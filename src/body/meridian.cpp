@@ -396,12 +396,11 @@ ProfilePoint profile_point(const Meridian& m, const Meridian::Place& place, doub
 
 Ripple ripple_at(const Meridian::Piece& piece, double t) {
   Ripple r;
-  double share[kMaxDegree + 1], sum = 0;
-  for (int j = 0; j <= piece.degree; ++j) {
-    share[j] = binomial(piece.degree, j) * std::pow(t, j) * std::pow(1 - t, piece.degree - j) * piece.w[j];
-    sum += share[j];
-  }
-  for (int j = 0; j <= piece.degree; ++j) r.add(share[j] / sum, piece.ripple[j]);
+  const double weight = evaluate(piece.w, piece.degree, t).f;
+  for (int j = 0; j <= piece.degree; ++j)
+    r.add(
+        binomial(piece.degree, j) * std::pow(t, j) * std::pow(1 - t, piece.degree - j) * piece.w[j] / weight,
+        piece.ripple[j]);
   return r;
 }
 

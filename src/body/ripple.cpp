@@ -88,30 +88,6 @@ bool by_azimuth(const UnitArc& arc, const Row& square, ByAzimuth* by) {
   return true;
 }
 
-// The first derivative along the profile, at most.
-template <class Value>
-Real along_profile(const ArcNet& net, const Value& value) {
-  Real most = 0;
-  for (int i = 0; i <= net.arc; ++i)
-    for (int j = 0; j < net.profile; ++j)
-      most = std::max<Real>(most, net.profile * (value(i, j + 1) - value(i, j)).norm());
-  return most;
-}
-
-// Along line j round the axis, of one component of the nets or of what they differ by.
-template <class Value>
-Most along_arc(const ArcNet& net, int j, const Value& value) {
-  const int n = net.arc;
-  Most m;
-  for (int i = 0; i <= n; ++i) {
-    m.f = std::max<Real>(m.f, value(i, j).norm());
-    if (i + 1 <= n) m.f1 = std::max<Real>(m.f1, n * (value(i + 1, j) - value(i, j)).norm());
-    if (i + 2 <= n)
-      m.f2 = std::max<Real>(m.f2, n * (n - 1) * (value(i + 2, j) - 2 * value(i + 1, j) + value(i, j)).norm());
-  }
-  return m;
-}
-
 // A net, the product near it and their arc, or a part of all three along the arc.
 struct Lines {
   ArcNet net, product;
@@ -140,6 +116,29 @@ struct Lines {
   Vector points_off(int i, int j) const { return (net.at(i, j) - product.at(i, j)).template head<3>(); }
   Number weights_off(int i, int j) const { return Number(net.at(i, j)[3] - product.at(i, j)[3]); }
   Number weights(int i, int j) const { return Number(net.at(i, j)[3]); }
+
+  // Of one of these along line j round the axis.
+  template <class Value>
+  Most along_arc(int j, Value value) const {
+    const auto at = [&](int i) { return (this->*value)(i, j); };
+    const int n = net.arc;
+    Most m;
+    for (int i = 0; i <= n; ++i) {
+      m.f = std::max<Real>(m.f, at(i).norm());
+      if (i + 1 <= n) m.f1 = std::max<Real>(m.f1, n * (at(i + 1) - at(i)).norm());
+      if (i + 2 <= n) m.f2 = std::max<Real>(m.f2, n * (n - 1) * (at(i + 2) - 2 * at(i + 1) + at(i)).norm());
+    }
+    return m;
+  }
+  // Its first derivative along the profile, at most.
+  template <class Value>
+  Real along_profile(Value value) const {
+    Real most = 0;
+    for (int i = 0; i <= net.arc; ++i)
+      for (int j = 0; j < net.profile; ++j)
+        most = std::max<Real>(most, net.profile * ((this->*value)(i, j + 1) - (this->*value)(i, j)).norm());
+    return most;
+  }
 };
 
 // The least weight, and how far a control point is from the axis point at most.
@@ -153,13 +152,11 @@ struct Extent {
   }
 };
 
-// By how much the arc's radius, the root of 1 + g, is off 1; nothing where that is not little. `by`: null for
-// the function alone.
-std::optional<Most> radius_off(const UnitArc& arc, const ByAzimuth* by) {
+// By how much the arc's radius, the root of 1 + g, is off 1; nothing where that is not little.
+std::optional<Most> radius_off(const UnitArc& arc) {
   const Row square = square_of(arc), w2 = times(arc.w, arc.w);
   if (!(least(w2) > 0)) return {};
-  Most g = most_of(difference(square, w2)) * inverse(most_of(w2), least(w2));
-  if (by) g = by->of(g);
+  const Most g = most_of(difference(square, w2)) * inverse(most_of(w2), least(w2));
   if (!(g.f < 0.01)) return {};
   return Most{0.51L * g.f, 0.51L * g.f1, 0.51L * g.f2 + 0.26L * g.f1 * g.f1};
 }
@@ -168,28 +165,26 @@ std::optional<Most> radius_off(const UnitArc& arc, const ByAzimuth* by) {
 bool include_rows(const Lines& l, std::vector<Ripple>* rows) {
   ByAzimuth by;
   if (!by_azimuth(l.arc, square_of(l.arc), &by)) return false;
-  const std::optional<Most> radius = radius_off(l.arc, &by);
+  const std::optional<Most> by_parameter = radius_off(l.arc);
   const Extent extent(l.net);
-  if (!radius || !(extent.least_weight > 0)) return false;
-  const auto points_off = [&](int i, int j) { return l.points_off(i, j); };
-  const auto weights_off = [&](int i, int j) { return l.weights_off(i, j); };
-  const auto weights = [&](int i, int j) { return l.weights(i, j); };
+  if (!by_parameter || !(extent.least_weight > 0)) return false;
+  const Most radius = by.of(*by_parameter);
   // P - P0 = (a - P0 b) / w, with what the nets differ by, a and, of weights, b. P0 runs round circles.
   Most w;
-  for (int j = 0; j <= l.net.profile; ++j) w.include(by.of(along_arc(l.net, j, weights)));
+  for (int j = 0; j <= l.net.profile; ++j) w.include(by.of(l.along_arc(j, &Lines::weights)));
   const Most over = inverse(w, extent.least_weight);
   const Real round = kSlack * extent.furthest;
   for (int j = 0; j <= l.net.profile; ++j) {
-    const Most a = by.of(along_arc(l.net, j, points_off)), b = by.of(along_arc(l.net, j, weights_off)),
+    const Most a = by.of(l.along_arc(j, &Lines::points_off)), b = by.of(l.along_arc(j, &Lines::weights_off)),
                off = (a + Most{round, round, round} * b) * over;
     Real wide = 0;
     for (int i = 0; i <= l.net.arc; ++i)
       wide = std::max<Real>(wide, l.net.at(i, j).head<2>().norm() / extent.least_weight);
     wide *= kSlack;
     // In the turning half plane.
-    (*rows)[j].include({static_cast<double>(off.f + wide * radius->f),
-                        static_cast<double>(off.f1 + off.f + wide * radius->f1),
-                        static_cast<double>(off.f2 + 2 * off.f1 + off.f + wide * radius->f2), 0});
+    (*rows)[j].include({static_cast<double>(off.f + wide * radius.f),
+                        static_cast<double>(off.f1 + off.f + wide * radius.f1),
+                        static_cast<double>(off.f2 + 2 * off.f1 + off.f + wide * radius.f2), 0});
   }
   return true;
 }
@@ -205,19 +200,16 @@ bool include_rows(Lines first, int halvings, std::vector<Ripple>* rows) {
 // What the ripple changes by along the profile.
 double ripple_along(const Lines& l, double speed, Real radius_off) {
   const Extent extent(l.net);
-  const auto points_off = [&](int i, int j) { return l.points_off(i, j); };
-  const auto weights_off = [&](int i, int j) { return l.weights_off(i, j); };
-  const auto weights = [&](int i, int j) { return l.weights(i, j); };
   const Real round = kSlack * extent.furthest;
   Real most_top = 0, most_off = 0;
   for (int j = 0; j <= l.net.profile; ++j) {
-    const Real off = along_arc(l.net, j, weights_off).f;
-    most_top = std::max(most_top, along_arc(l.net, j, points_off).f + round * off);
+    const Real off = l.along_arc(j, &Lines::weights_off).f;
+    most_top = std::max(most_top, l.along_arc(j, &Lines::points_off).f + round * off);
     most_off = std::max(most_off, off);
   }
-  const Real top_along = along_profile(l.net, points_off) + kSlack * speed * most_off +
-                         round * along_profile(l.net, weights_off),
-             along = (top_along + most_top * along_profile(l.net, weights) / extent.least_weight) /
+  const Real top_along = l.along_profile(&Lines::points_off) + kSlack * speed * most_off +
+                         round * l.along_profile(&Lines::weights_off),
+             along = (top_along + most_top * l.along_profile(&Lines::weights) / extent.least_weight) /
                      extent.least_weight;
   return static_cast<double>(along + kSlack * speed * radius_off);
 }
@@ -230,7 +222,7 @@ std::vector<Ripple> ripple_of(const ArcNet& net, const ArcNet& product, const Un
       !std::all_of(product.points.begin(), product.points.end(), heavy))
     return {};
   Lines lines{net, product, arc};
-  const std::optional<Most> radius = radius_off(arc, nullptr);
+  const std::optional<Most> radius = radius_off(arc);
   if (!radius) return {};
   const double along = ripple_along(lines, speed, radius->f);
   lines.normalise();

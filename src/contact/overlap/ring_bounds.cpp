@@ -9,7 +9,6 @@ constexpr double kNearAzimuth = 0.3;    // rad, of a circle's asked azimuth
 constexpr double kChord = 1.05;         // up to 0.5 rad: no less than the angle over its chord or sine
 constexpr double kWidestSecond = 0.88;  // cosine of that
 constexpr double kOffRipple = 3;        // times the most it is off by, a circle is known all round
-constexpr double kRippleShare = 0.2;    // of the tolerance, up to which rippled circles are followed anyway
 constexpr double kNextFar = 1e-3;       // sine between the angles of rippled circles that are not
 constexpr double kSteepSine = 0.02;     // up to which lengths are taken off radii instead
 
@@ -51,11 +50,6 @@ double RingSectors::turn_to(const Sector& sector, const Wave& w) {
   return turn - 2 * M_PI * std::nearbyint(turn * (0.5 / M_PI));
 }
 
-Angle RingSectors::near_of(const Wave& w) const {
-  const double turn = std::min(M_PI_2, std::sqrt(2 * kRippleShare * tolerance_ / w.ripple.bend));
-  return w.ripple.bend > 0 ? Angle{std::cos(turn), std::sin(turn)} : Angle{0, 1};
-}
-
 void RingSectors::choose(const Sector& sector, double half) {
   const auto before = [&](short c, const Angle& a) { return cross(flat_[c].at, a) > 0; };
   const short *const begin = order_, *const end = order_ + count_;
@@ -64,9 +58,10 @@ void RingSectors::choose(const Sector& sector, double half) {
   const double reach = std::max(kNearAzimuth, 2 * half);
   const Angle& u = sector.u;
   const bool wide = 2 * half > M_PI_2;
-  const Angle twice{std::cos(2 * half), std::sin(2 * half)};
+  const Angle once = half > 0 ? sector.turn : Angle{1, 0}, twice{1 - 2 * square(once.s), 2 * once.s * once.c};
   const auto near = [&](const FlatCircle& c) {
-    if (view_.rippled()) return wide || c.u.c * u.c + c.u.s * u.s >= twice.c * c.near.c - twice.s * c.near.s;
+    if (view_.rippled())
+      return wide || c.u.c * u.c + c.u.s * u.s >= twice.c * c.wave.near.c - twice.s * c.wave.near.s;
     return (view_.circles && !c.lone) || reach > 1 || c.at.s == 0 ||
            2 - 2 * (c.u.c * u.c + c.u.s * u.s) <= square(reach);
   };

@@ -22,12 +22,11 @@ constexpr double kMeridianShare = 0.4;  // ... and below which its width, not it
 constexpr double kLeastTilt = 3e-3;     // sine between the axes from which the mate's tip may do better
 constexpr double kCoreDepth = 0.98;     // ... and of the overlap
 constexpr int kFirstAngles = 7;
-constexpr int kRippledCost = 3;        // sectors, as one of rippled circles, ...
-constexpr double kFollowedCost = 25;   // ... besides one for so many that are followed
-constexpr double kOnPaceRippled = 10;  // kOnPace ...
-constexpr double kFirstSpentRippled =
-    1;                                // ... and kFirstSpent of those, of which one tells little of the next
-constexpr double kSameAngle = 1e-13;  // rad
+constexpr int kRippledCost = 3;           // sectors, as one of rippled circles, ...
+constexpr double kFollowedCost = 25;      // ... besides one for so many that are followed
+constexpr double kOnPaceRippled = 10;     // kOnPace ...
+constexpr double kFirstSpentRippled = 1;  // ... and kFirstSpent of those
+constexpr double kSameAngle = 1e-13;      // rad
 constexpr SurfacePoint kAnywhere{-1, 0, 0};
 
 }  // namespace
@@ -97,30 +96,35 @@ bool RingSectors::query(const Vec3& e) {
   ++queries_;
   const Vec3 own_k = view_.turn_k.transpose() * e, own_m = view_.turn_m.transpose() * -e;
   std::optional<Support> k, m;
-  const auto support = [&](const Shape& shape, double scale, const Vec3& own) {
-    return find_hull_support(shape, own, nullptr, kSupportShare * tolerance_ / scale, kHullSlope);
+  const auto find_support = [&](const Shape& shape, double scale, const Vec3& own,
+                                std::optional<Support>* on) {
+    if (!*on) *on = find_hull_support(shape, own, nullptr, kSupportShare * tolerance_ / scale, kHullSlope);
+  };
+  const auto find_supports = [&](bool of_k, bool of_m) {
+    if (of_k) find_support(*view_.k, view_.scale_k, own_k, &k);
+    if (of_m) find_support(*view_.m, view_.scale_m, own_m, &m);
   };
   Line line_k{}, line_m{};
   const auto find_lines = [&](const SurfacePoint& on_k, const SurfacePoint& on_m) {
     if (view_.near_k) line_k = line_of(*view_.k, view_.scale_k, view_.turn_k, e, on_k);
     if (view_.near_m) line_m = line_of(*view_.m, view_.scale_m, view_.turn_m, -e, on_m);
   };
-  find_lines(kAnywhere, kAnywhere);
-  if (!line_k.known) k = support(*view_.k, view_.scale_k, own_k);
-  if (!line_m.known) m = support(*view_.m, view_.scale_m, own_m);
   const auto overlap = [&] {
     return (k ? view_.scale_k * k->upper : e.dot(line_k.at)) +
            (m ? view_.scale_m * m->upper : -e.dot(line_m.at)) - balls() - e.dot(view_.offset);
   };
-  if (overlap() < best_ || count_ == 0) {
-    if (!k) k = support(*view_.k, view_.scale_k, own_k);
-    if (!m) m = support(*view_.m, view_.scale_m, own_m);
+  find_lines(kAnywhere, kAnywhere);
+  find_supports(!line_k.known, !line_m.known);
+  const bool first = count_ == 0;
+  if (first || overlap() < best_) {
+    find_supports(true, true);
     const double p = overlap();
-    if (p < best_) {
+    const bool lower = p < best_;
+    if (lower) {
       best_ = p;
       best_e_ = e;
     }
-    if (p == best_ || count_ == 0) {
+    if (lower || first) {
       on_k_ = k->where;
       on_m_ = m->where;
     }
@@ -149,8 +153,8 @@ bool RingSectors::query(const Vec3& e) {
   c.k = view_.offset - view_.point + c.middle;
   const double around = c.at.s > 0 ? 1 / c.at.s : 0;
   const Angle u{around * tangent_.dot(e), around * second_.dot(e)};
-  const Wave wave = this->wave(e, line_k, line_m);
-  flat_[count_] = {c.at, u, c.rm, c.lone, flat(c.r, c.z, c.k), flat(0, 0, c.k - c.on_k), wave, near_of(wave)};
+  flat_[count_] = {
+      c.at, u, c.rm, c.lone, flat(c.r, c.z, c.k), flat(0, 0, c.k - c.on_k), wave(e, line_k, line_m)};
   insert(c);
   return true;
 }
@@ -175,23 +179,25 @@ RingSectors::Wave RingSectors::wave(const Vec3& e, const Line& k, const Line& m)
   wave.phi = azimuth(e);
   if ((view_.near_k && !k.known) || (view_.near_m && !m.known)) {
     wave.ripple = view_.ripple;
-    return wave;
+  } else {
+    wave.before = wave.after = M_PI;
+    if (k.known) {
+      wave.k_r = view_.scale_k * k.on.slope_r;
+      wave.k_z = view_.scale_k * k.on.slope_z;
+      wave.reach(k.on.before, k.on.after);
+      wave.ripple.add(view_.scale_k, k.on.ripple);
+    }
+    if (m.known) {
+      const bool against = view_.turn_m_sign < 0;
+      wave.m_r = view_.turn_m_sign * view_.scale_m * m.on.slope_r;
+      wave.m_z = view_.scale_m * m.on.slope_z;
+      wave.reach(against ? m.on.after : m.on.before, against ? m.on.before : m.on.after);
+      wave.ripple.add(view_.scale_m, m.on.ripple);
+    }
+    wave.steep = std::hypot(wave.k_r, wave.k_z) + std::hypot(wave.m_r, wave.m_z);
   }
-  wave.before = wave.after = M_PI;
-  if (k.known) {
-    wave.k_r = view_.scale_k * k.on.slope_r;
-    wave.k_z = view_.scale_k * k.on.slope_z;
-    wave.reach(k.on.before, k.on.after);
-    wave.ripple.add(view_.scale_k, k.on.ripple);
-  }
-  if (m.known) {
-    const bool against = view_.turn_m_sign < 0;
-    wave.m_r = view_.turn_m_sign * view_.scale_m * m.on.slope_r;
-    wave.m_z = view_.scale_m * m.on.slope_z;
-    wave.reach(against ? m.on.after : m.on.before, against ? m.on.before : m.on.after);
-    wave.ripple.add(view_.scale_m, m.on.ripple);
-  }
-  wave.steep = std::hypot(wave.k_r, wave.k_z) + std::hypot(wave.m_r, wave.m_z);
+  const double turn = std::min(M_PI_2, std::sqrt(2 * kRippleShare * tolerance_ / wave.ripple.bend));
+  wave.near = {std::cos(turn), std::sin(turn)};
   return wave;
 }
 

@@ -24,6 +24,8 @@ class RingSectors {
 
  private:
   static constexpr int kMostCircles = HalfPlaneHull::kMost;  // supports evaluated
+  // Of the tolerance, up to which rippled circles are followed anyway.
+  static constexpr double kRippleShare = 0.2;
   using Least = HalfPlaneHull::Least;
 
   // What one support evaluation says of every direction.
@@ -45,6 +47,7 @@ class RingSectors {
     double phi = 0, k_r = 0, k_z = 0, m_r = 0, m_z = 0, before = -1, after = -1;
     double steep = 0;  // all of them, at most
     Ripple ripple;     // of both bodies' lines
+    Angle near{1, 0};  // how far from there it hardly tells
     void reach(double low, double high) {
       before = std::min(before, low);
       after = std::min(after, high);
@@ -63,7 +66,6 @@ class RingSectors {
     bool lone;
     Flat whole, alone;  // as a circle, and as its point
     Wave wave;
-    Angle near;  // how far from where it was asked for the ripple hardly tells
   };
 
   struct Sector {
@@ -119,7 +121,6 @@ class RingSectors {
   void witness(int k, const Sector& there, Vec3* on_k, Vec3* on_m) const;
 
   // The bounds.
-  Angle near_of(const Wave& w) const;
   // To a sector's middle from where a circle was asked for, rad.
   static double turn_to(const Sector& sector, const Wave& w);
   // The order of circles is that of the angles they were asked for. Chosen are those asked for in a sector,
