@@ -41,9 +41,19 @@ double turn(Real x0, Real y0, Real x1, Real y1) {
   return static_cast<double>(std::atan2(x0 * y1 - y0 * x1, x0 * x1 + y0 * y1));
 }
 
-// What an arc leaves its unit circle by, outwards, of its radius: from the coefficients of x^2 + y^2 - w^2.
-double beyond_circle(const Meridian::Sector& s, const Row& weight) {
-  Real most = 0;
+// What one thing leaves another by: how far it reaches beyond it, and how much it lacks.
+struct Off {
+  double beyond = 0, lack = 0;
+  double most() const { return std::max(beyond, lack); }
+  void include(const Off& other) {
+    beyond = std::max(beyond, other.beyond);
+    lack = std::max(lack, other.lack);
+  }
+};
+
+// An arc its unit circle, of its radius: from the coefficients of x^2 + y^2 - w^2.
+Off off_circle(const Meridian::Sector& s, const Row& weight) {
+  Real most = 0, least = 0;
   for (int m = 0; m <= 2 * s.degree; ++m) {
     Real beyond = 0, square = 0;
     for (int i = std::max(0, m - s.degree); i <= std::min(s.degree, m); ++i) {
@@ -54,20 +64,22 @@ double beyond_circle(const Meridian::Sector& s, const Row& weight) {
       beyond += share * (static_cast<Real>(s.x[i]) * s.x[k] + static_cast<Real>(s.y[i]) * s.y[k] - w2);
     }
     most = std::max(most, beyond / square);
+    least = std::min(least, beyond / square);
   }
-  return static_cast<double>(0.5L * most);
+  return {static_cast<double>(0.5L * most), static_cast<double>(1 - std::sqrt(std::max<Real>(0, 1 + least)))};
 }
 
-// Profile and arc whose product the net is, and how far outside of that it reaches, a length. `rippled`:
-// whether how is asked for; where it is not known, the net is none.
-double factorise(const ArcNet& net, bool rippled, Meridian::Piece* piece, Meridian::Sector* sector) {
+// Profile and arc whose product the net is, and what it leaves that by, lengths. `rippled`: whether how is
+// asked for; where it is not known, the net is none.
+Off factorise(const ArcNet& net, bool rippled, Meridian::Piece* piece, Meridian::Sector* sector) {
+  const Off none{kFarAway, kFarAway};
   int widest = 0;
   Real r = 0;
   for (int j = 0; j <= net.profile; ++j) {
     const Real off = net.at(0, j).head<2>().norm();
     if (off > r) r = off, widest = j;
   }
-  if (!(r > 0)) return kFarAway;
+  if (!(r > 0)) return none;
   Row weight{};  // of the arc
   sector->degree = net.arc;
   for (int i = 0; i <= net.arc; ++i) {
@@ -109,14 +121,14 @@ double factorise(const ArcNet& net, bool rippled, Meridian::Piece* piece, Meridi
   sector->sweep = 0;  // by the way the control points go round, less than half a turn each
   for (int i = 0; i < net.arc; ++i)
     sector->sweep += turn(sector->x[i], sector->y[i], sector->x[i + 1], sector->y[i + 1]);
-  const double outside =
-      static_cast<double>(error) + furthest * std::max(0.0, beyond_circle(*sector, weight));
+  const Off circle = off_circle(*sector, weight), off{static_cast<double>(error) + furthest * circle.beyond,
+                                                      static_cast<double>(error) + furthest * circle.lack};
   if (rippled) {
     const auto row = [&](const Row& r) { return std::vector<Real>(r.begin(), r.begin() + net.arc + 1); };
     piece->ripple = ripple_of(net, product, {row(sector->x), row(sector->y), row(weight)}, piece->speed);
-    if (piece->ripple.empty()) return kFarAway;
+    if (piece->ripple.empty()) return none;
   }
-  return outside;
+  return off;
 }
 
 // How far apart two pieces are, run through the same or opposite ways, their weights' difference counted with
@@ -469,21 +481,22 @@ Meridian make_meridian(const std::vector<BezierPatch>& patches, const Revolution
     std::vector<Meridian::Sector> sectors;
   };
   std::vector<Found> all;
+  Off all_off;
   for (size_t p = 0; p < patches.size(); ++p) {
     Meridian::Piece piece;
     Meridian::Sector sector;
-    double error = kFarAway;
+    Off off{kFarAway, kFarAway};
     for (const bool arcs_in_u : {true, false}) {
       Meridian::Piece profile;
       Meridian::Sector arc;
-      const double e = factorise(net_about(patches[p], arcs_in_u, m), rippled, &profile, &arc);
-      if (!(e < error) || arc.sweep == 0) continue;
-      error = e;
+      const Off o = factorise(net_about(patches[p], arcs_in_u, m), rippled, &profile, &arc);
+      if (!(o.most() < off.most()) || arc.sweep == 0) continue;
+      off = o;
       piece = profile;
       sector = arc;
       sector.arcs_in_u = arcs_in_u;
     }
-    if (!(error <= close)) {
+    if (!(off.most() <= close)) {
       if (!(out_of_plane(patches[p], revolution.axis) <= close)) return {};
       continue;
     }
@@ -495,10 +508,11 @@ Meridian make_meridian(const std::vector<BezierPatch>& patches, const Revolution
         if (!(apart <= close)) continue;
         mine = &f;
         sector.backwards = backwards;
-        error += apart;
+        off.beyond += apart;
+        off.lack += apart;
         for (Ripple& r : piece.ripple) r.most += apart;
       }
-    m.error = std::max(m.error, error);
+    all_off.include(off);
     if (!mine) {
       all.push_back({piece, {}});
       mine = &all.back();
@@ -522,8 +536,12 @@ Meridian make_meridian(const std::vector<BezierPatch>& patches, const Revolution
     }
     m.pieces.push_back(f.piece);
   }
-  if (m.pieces.empty() || !(m.error <= close)) return {};
-  m.exact = m.error <= kMeridianLack * size;
+  if (m.pieces.empty() || !(all_off.most() <= close)) return {};
+  const double roundoff = kMeridianSame * size;
+  m.beyond = all_off.beyond;
+  m.error = all_off.most();
+  m.bounds = m.beyond <= roundoff;
+  m.exact = m.error <= roundoff;
   for (int k = 0; k <= kMeridianStarts; ++k) {
     const double at = 2.0 * k / kMeridianStarts - 1, dr = 1 - std::abs(at), length = std::hypot(dr, at);
     Meridian::Place best;
@@ -576,7 +594,7 @@ bool find_meridian_support(const Meridian& m, const Vec3& d, double size, const 
 
   const auto put = [&](const Meridian::Sector& sector, double u) {
     found->where = point_on(sector, u, best);
-    found->upper = search.height() + d.dot(m.point) + search.slack() + m.error;
+    found->upper = search.height() + d.dot(m.point) + search.slack() + m.beyond;
     return true;
   };
   const bool stays = last && piece_swept(m, *last) == best.piece;

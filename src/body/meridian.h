@@ -42,13 +42,17 @@ struct Meridian {
   std::vector<int> sector_of;    // per patch; -1: of a plane that other patches bound
   Mat3 axes = Mat3::Identity();  // rows: two across the axis, and the axis
   Vec3 point = Vec3::Zero();     // on it
-  double error = 0;              // by how much the body's support may exceed that of the above
-  bool exact = false;            // that is round-off
+  double beyond = 0;             // by how much the body's support may exceed that of the above
+  double error = 0;              // and by how much it may differ from it
+  bool bounds = false;           // the former is round-off
+  bool exact = false;            // both are
   Ripple ripple;                 // of all, at most
   double seam = 0;               // what their lines round the axis are off where they meet, all round
 
   bool empty() const { return pieces.empty(); }
-  // Whether there is one that the body is off by no more than `allowed`, or round-off.
+  // Whether there is one whose support bounds the body's, but for `allowed` or round-off.
+  bool bounds_within(double allowed) const { return !empty() && (bounds || beyond <= allowed); }
+  // Whether there is one that is the body, but for that.
   bool serves(double allowed) const { return !empty() && (exact || error <= allowed); }
 };
 template <class Archive>
@@ -68,8 +72,8 @@ void archive(Archive& a, Meridian::Place& s) {
 }
 template <class Archive>
 void archive(Archive& a, Meridian& s) {
-  auto& [pieces, sectors, starts, sector_of, axes, point, error, exact, ripple, seam] = s;
-  a(pieces, sectors, starts, sector_of, axes, point, error, exact, ripple, seam);
+  auto& [pieces, sectors, starts, sector_of, axes, point, beyond, error, bounds, exact, ripple, seam] = s;
+  a(pieces, sectors, starts, sector_of, axes, point, beyond, error, bounds, exact, ripple, seam);
 }
 
 // Of a body of revolution whose joints meet to round-off. `size`: bounding radius. Patches in a plane square

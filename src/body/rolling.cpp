@@ -70,7 +70,7 @@ JointDistance measure_joint_distance(const Shape& shape) {
   return joints;
 }
 
-RollingRadii rolling_radii(const Shape& shape, const SurfacePoint& at, const Vec3& normal) {
+RollingRadii rolling_radii(const Shape& shape, const SurfacePoint& at, const Vec3& normal, double enough) {
   const JointDistance& joints = shape.joints;
   const CurvatureBounds& patch = shape.patch_curvature;
   const double near = shape.normal_map.cells > 0 ? shape.normal_map.radius_at(normal) : kInfinity;
@@ -85,7 +85,8 @@ RollingRadii rolling_radii(const Shape& shape, const SurfacePoint& at, const Vec
   const double parameter[4] = {at.u, 1 - at.u, at.v, 1 - at.v};
   for (int edge = 0; edge < 4; ++edge)
     if (speed[edge] < kInfinity) s = std::min(s, speed[edge] * std::max(0.0, parameter[edge]));
-  const double r0 = patch.min_radius, enough = kSharp * shape.bounding_radius;
+  const double r0 = patch.min_radius;
+  enough = std::min(enough, kSharp * shape.bounding_radius);
   const auto ball_clear_of = [&](double distance) {
     return std::min(r0, inscribed(shape, kSineOfOne * std::min(distance, r0)));
   };

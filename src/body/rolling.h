@@ -4,10 +4,13 @@
 
 #include <array>
 #include <cmath>
+#include <limits>
 #include <vector>
 
 #include "body/direction_atlas.h"
 #include "body/kink_segments.h"
+#include "body/small_kinks.h"
+#include "nurbs/tolerances.h"
 
 namespace nurbs {
 
@@ -32,7 +35,8 @@ void archive(Archive& a, JointDistance& s) {
 // At a surface point x with outward normal n:
 //   a ball of radius `inner` that touches at x lies inside the body;
 //   h(d) <= d.x + outer (1 - d.n) + slack for every unit d;
-//   h(d) <= d.x + near (1 - d.n) for unit d with |d - n| <= kNormalMargin, where `near` is finite.
+//   h(d) <= d.x + near (1 - d.n) for unit d with |d - n| <= kNormalMargin, where `near` is finite;
+// but for what small kinks add.
 struct RollingRadii {
   double inner, outer, slack, near;
 };
@@ -46,6 +50,17 @@ inline double rolling_excess(double outer, double bounding_radius, double chord2
   return rolling < wedge ? rolling : wedge;
 }
 
+// h(d) - d.x at most, for |d - n|^2 = chord2.
+inline double rolling_excess(const RollingRadii& radii, const SmallKinks& kinks, double bounding_radius,
+                             double chord2) {
+  const bool near = chord2 <= kNormalMargin * kNormalMargin && radii.near < kFarAway;
+  const double smooth =
+      near ? 0.5 * radii.near * chord2 : rolling_excess(radii.outer, bounding_radius, chord2) + radii.slack;
+  if (!(kinks.met > 0)) return smooth;
+  const double chord = std::sqrt(chord2);
+  return smooth + (near ? kinks.excess(radii.near, chord) : kinks.excess_outside(radii.outer, chord));
+}
+
 // Of a shape whose patches and links, with their kinks, are done.
 JointDistance measure_joint_distance(const Shape& shape);
 
@@ -54,7 +69,7 @@ JointDistance measure_joint_distance(const Shape& shape);
 //
 // Without kinks the radii are r0 and P0: Blaschke's rolling theorem, whose hypotheses are a closed convex
 // surface with continuous normals and all curvature radii in [r0, P0]. Normals that jump by up to kNoKink
-// have been taken off the radii (small_kinks.h), but for a slack that brackets count.
+// have been taken off the radii, but for a rise that brackets count (small_kinks.h).
 //
 // With kinks, a ball of radius r that touches at x lies in the body K if K's surface over the disc of radius
 // r of the tangent plane at x is above it, and r <= t I / (t + O) for some t >= r such that it covers the
@@ -69,10 +84,12 @@ JointDistance measure_joint_distance(const Shape& shape);
 //     tangent plane at distance v and the surface at most v^2 / (2 r0) + 4 kink (v - s), so r <= s / (4 kink)
 //     suffices; and t as above with the width for s.
 // Either holds with the least radius of the surface around x as far as that is known (LocalRate::room), taken
-// for s: a body that bends sharply elsewhere has larger balls.
+// for s: a body that bends sharply elsewhere has larger balls. Balls of radius `enough` are not looked into
+// further.
 //
 // Likewise a closing kink stays inside the ball of radius 2 P0 once s >= P0 kink; nearer, the surface may
 // rise by shape.support_excess. `near` is the normal map's. A few ns.
-RollingRadii rolling_radii(const Shape& shape, const SurfacePoint& at, const Vec3& normal);
+RollingRadii rolling_radii(const Shape& shape, const SurfacePoint& at, const Vec3& normal,
+                           double enough = std::numeric_limits<double>::infinity());
 
 }  // namespace nurbs

@@ -8,6 +8,7 @@
 namespace nurbs {
 namespace {
 
+constexpr double kNoTilt = 1e-12;     // rad
 constexpr double kNoSlack = 4e-16;    // of the size: round-off
 constexpr double kMostSlack = 4e-13;  // ... and what may be given away
 constexpr double kLittle = 1e-2;      // of a radius of that size, to be lost before
@@ -22,6 +23,7 @@ SmallKinks find_small_kinks(const std::vector<std::array<EdgeLink, 4>>& links, d
   SmallKinks small;
   const double met = kGapsCrossed * kink, half = 0.5 * met * met;
   if (!(half > 0)) return small;
+  if (met > kNoTilt) small.met = met;
   const double slack = size * std::clamp(half / kLittle, kNoSlack, kMostSlack);
   small.share = half / slack;
   small.density = kink * static_cast<double>(links.size());

@@ -2,6 +2,7 @@
 // from the balls that roll inside and around a body.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <limits>
 #include <vector>
@@ -18,10 +19,13 @@ struct EdgeLink;
 // what h has over a ball of radius r' < r that touches where d is supported is, t further on,
 //     y(t) >= (r - r') (1 - cos t) - r beta sin t >= -r^2 beta^2 / (2 (r - r')).
 // With r' = r (1 - share r) that is -beta^2 / (2 share), whatever r is: such balls rise above the body by no
-// more than `slack`. Of closing kinks the same holds of balls around it. Kinks one after the other bend what
-// lies between them by `density` of a radius besides. Hypotheses: no more than kGapsCrossed are met at once,
-// and in a radian no more than the body has patches.
+// more than `slack`. A ball of r' <= r / 2 rises by at most r' beta sin t, and by 2 r' beta^2 wherever: next
+// to a much smaller body, whose touching balls need not be larger than that, it is that body's size that
+// counts. Of closing kinks the same holds of balls around it. Kinks one after the other bend what lies
+// between them by `density` of a radius besides. Hypotheses: no more than kGapsCrossed are met at once, and
+// in a radian no more than the body has patches.
 struct SmallKinks {
+  double met = 0;      // beta, rad; 0 where it is round-off
   double share = 0;    // over a length of scale 1
   double density = 0;  // kinks times patches, rad a rad
   double slack = 0;    // length of scale 1; 0 where it is round-off
@@ -35,11 +39,16 @@ struct SmallKinks {
     const double bent = radius * (1 + density);
     return bent < std::numeric_limits<double>::infinity() ? bent * (1 + share * bent) : bent;
   }
+
+  // What the support function may exceed a ball around the body by, `chord` from the direction in which that
+  // touches: of the patches' largest radius, and of outside(that), where an infinite one serves.
+  double excess(double radius, double chord) const { return radius * met * chord; }
+  double excess_outside(double radius, double chord) const { return std::min(slack, excess(radius, chord)); }
 };
 template <class Archive>
 void archive(Archive& a, SmallKinks& s) {
-  auto& [share, density, slack] = s;
-  a(share, density, slack);
+  auto& [met, share, density, slack] = s;
+  a(met, share, density, slack);
 }
 
 // Of links whose kinks are bounded; `size`: bounding radius.

@@ -199,9 +199,7 @@ Normal normal_at(const Shape& shape, const Vec3& su, const Vec3& sv) {
 double excess_at(const Shape& shape, const Vec3& d, const SurfacePoint& at, const Normal& normal) {
   if (!(d.dot(normal.n) > 0)) return std::numeric_limits<double>::infinity();
   const double chord = (d - normal.n).norm() + normal.noise, chord2 = chord * chord;
-  const RollingRadii radii = rolling_radii(shape, at, normal.n);
-  if (chord2 <= kNormalMargin * kNormalMargin && radii.near < kFarAway) return 0.5 * radii.near * chord2;
-  return rolling_excess(radii.outer, shape.bounding_radius, chord2) + radii.slack;
+  return rolling_excess(rolling_radii(shape, at, normal.n), shape.small_kinks, shape.bounding_radius, chord2);
 }
 
 // The edge of its patch that a point lies on; -1 inside and at corners.
@@ -236,7 +234,8 @@ double crease_excess(const Shape& shape, const Vec3& d, const SurfacePoint& at, 
                        std::max(0.0, inward_slope(here, edge, d)) +
                        std::max(0.0, inward_slope(there, link.edge, d));
   if (!(chord <= 0.5 * kNormalMargin)) return kNone;
-  return kFanSafety * rolling_excess(radius, shape.bounding_radius, chord * chord) + link.gap +
+  return kFanSafety * rolling_excess(radius, shape.bounding_radius, chord * chord) +
+         (bent ? shape.small_kinks.excess(radius, chord) : shape.small_kinks.slack) + link.gap +
          (bent ? 0 : shape.support_excess);
 }
 
@@ -258,8 +257,7 @@ Normal set_point(const Shape& shape, const Vec3& d, const SurfacePoint& at, Supp
 // No point of the body is higher along d than this, which is not below h, the height of one: h and `excess`,
 // or of a sphero-polyhedron less.
 double upper_bound(const Shape& shape, const Vec3& d, double h, double excess) {
-  const double roundoff = kRoundoff * shape.bounding_radius + shape.small_kinks.slack,
-               upper = h + excess + roundoff;
+  const double roundoff = kRoundoff * shape.bounding_radius, upper = h + excess + roundoff;
   const SpheroPolyhedron& core = shape.core;
   if (!core.found()) return upper;
   const double height = d.dot(core.points[core.support(d)]) + core.radius + core.error + roundoff;
@@ -396,7 +394,7 @@ bool is_certain(const Shape& shape, const Support& s, double enough) {
 bool find_on_meridian(const Shape& shape, const Vec3& d, const SurfacePoint* start, double enough,
                       Support* s) {
   MeridianSupport found;
-  if (!shape.meridian.serves(0.5 * enough) ||
+  if (!shape.meridian.bounds_within(0.5 * enough) ||
       !find_meridian_support(shape.meridian, d, shape.bounding_radius, start, &found))
     return false;
   const Jet1 jet = evaluate1(shape.patches[found.where.patch], found.where.u, found.where.v);

@@ -71,9 +71,7 @@ inline double support_excess(const Shape& shape, double scale, const RollingRadi
                              const Vec3& n, double noise = 0) {
   double chord2 = (d - n).squaredNorm();  // 2 (1 - cos), without cancellation
   if (noise > 0) chord2 = widened_chord2(chord2, noise);
-  if (chord2 <= kNormalMargin * kNormalMargin && radii.near < kFarAway)
-    return 0.5 * scale * radii.near * chord2;
-  return scale * (rolling_excess(radii.outer, shape.bounding_radius, chord2) + radii.slack);
+  return scale * rolling_excess(radii, shape.small_kinks, shape.bounding_radius, chord2);
 }
 
 // Radii at a point whose normal is n in axes that `axes` turns the shape's into.
@@ -87,10 +85,13 @@ inline RollingRadii radii_at(const Shape& shape, const SurfacePoint& at, const M
 inline Bracket certify(const PairFrame& pair, const PointPair& p, double noise_a, double noise_b) {
   const RollingRadii radii_a = radii_at(*pair.a, p.on_a, nullptr, p.na),
                      radii_b = radii_at(*pair.b, p.on_b, &pair.turn, p.nb);
-  // A flat part has no largest ball; one as large as the other body's reach does. Where the normal points
-  // anywhere none is known to touch.
-  const double rho_a = noise_a < kNoNormal ? std::min(pair.scale_a * radii_a.inner, pair.reach) : 0;
-  const double rho_b = noise_b < kNoNormal ? std::min(pair.scale_b * radii_b.inner, pair.reach) : 0;
+  // Where the normal points anywhere none is known to touch.
+  const double depth = p.na.dot(p.a - p.b);
+  const auto ball = [&](const Shape& shape, double inner, double noise) {
+    return noise < kNoNormal ? std::min(inner, pair.largest_ball(shape, depth)) : 0;
+  };
+  const double rho_a = ball(*pair.a, pair.scale_a * radii_a.inner, noise_a),
+               rho_b = ball(*pair.b, pair.scale_b * radii_b.inner, noise_b);
   const Vec3 core = (p.b - rho_b * p.nb) - (p.a - rho_a * p.na);
   const double distance = core.norm();
   const Vec3 mean = p.na - p.nb;
@@ -99,7 +100,6 @@ inline Bracket certify(const PairFrame& pair, const PointPair& p, double noise_a
   const bool apart = core.dot(mean) > 0 && distance > kNoDirection * pair.reach;
   bracket.direction = apart ? Vec3(core / distance) : Vec3(mean.normalized());
   const Vec3& d = bracket.direction;
-  const double roundoff = pair.noise;
   bracket.angle2 = std::max((d - p.na).squaredNorm(), (d + p.nb).squaredNorm());
   bracket.unique = rho_a + rho_b;
   const auto dented = [](const Shape& shape, const RollingRadii& radii) {
@@ -110,10 +110,11 @@ inline Bracket certify(const PairFrame& pair, const PointPair& p, double noise_a
   const auto beside = [&](double rho, double noise, const Vec3& out) {
     return noise > 0 ? ball_beside(rho, std::min(noise, 1.0), (d - out).norm(), distance) : 0;
   };
-  bracket.upper = distance - rho_a - rho_b + slack + roundoff + beside(rho_a, noise_a, p.na) +
+  bracket.upper = distance - rho_a - rho_b + slack + pair.roundoff +
+                  pair.rise_between(rho_a, rho_b, distance) + beside(rho_a, noise_a, p.na) +
                   beside(rho_b, noise_b, -p.nb);
   bracket.lower = d.dot(p.b - p.a) - support_excess(*pair.a, pair.scale_a, radii_a, d, p.na, noise_a) -
-                  support_excess(*pair.b, pair.scale_b, radii_b, -d, p.nb, noise_b) - roundoff;
+                  support_excess(*pair.b, pair.scale_b, radii_b, -d, p.nb, noise_b) - pair.roundoff;
   if (!(d.squaredNorm() > 0)) bracket.lower = -kFarAway;
   return bracket;
 }

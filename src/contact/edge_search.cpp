@@ -14,6 +14,8 @@ constexpr int kEdgeIterations = 8;       // 1 or 2 are usual
 constexpr double kLeastCrossing = 1e-4;  // sine of the angle between edges
 constexpr double kGoesOn = 0.99;         // cosine of the angle between an edge and the one that it goes on as
 constexpr double kAcross = 0.1;          // cosine between an edge and a normal that it may be square to
+constexpr double kRoomyBall = 4;         // of the overlap: a ball that serves ...
+constexpr double kLeastBall = 1e-3;      // ... and of the size
 constexpr double kOffShare = 0.01;       // of lambda, that makes up for r
 
 // What a contact point is free to move on: 2 parameters on a surface, 1 on an edge, none at a vertex.
@@ -311,8 +313,9 @@ bool meet(const PairFrame& pair, Side a, Side b, const Vec3& direction, double t
   }
   const auto [top_a, top_b] = hull_supports(pair, n, &a.at, &b.at, tolerance);
   const double overlap = pair.overlap_along(n, top_a.upper, top_b.upper);
+  const double enough = std::max(kRoomyBall * std::abs(n.dot(p.a - p.b)), kLeastBall * pair.size);
   const auto ball = [&](const Side& side, const Vec3& d) {
-    return side.feature.freedom == 2 ? touching_ball(pair, *side.shape, side.at, d, side.scale, d)
+    return side.feature.freedom == 2 ? touching_ball(pair, *side.shape, side.at, d, side.scale, d, enough)
                                      : TouchingBall{0, d};
   };
   const Bracket bracket =

@@ -27,6 +27,7 @@ struct Sides {
   V normal;                        // outward, unit
   WideMask plain;                  // not next to a pole
   Wide inner, outer, slack, near;  // RollingRadii, lengths of the lab
+  Wide met;                        // small kinks, rad
   Wide noise;                      // of the normal, rad
 };
 
@@ -64,7 +65,7 @@ NURBS_INLINE Sides look(unsigned open, const Shape* const (&shape)[kWidth], cons
   constexpr double kLost = kNearPole * kNearPole;  // nearer, round-off counts in the certificate
   out.plain = (lu >= kLost * lv) & (lv >= kLost * lu);
   const V area = cross(su, sv), n = normalized(area);
-  out.inner = out.outer = out.slack = out.near = out.noise = Wide{};
+  out.inner = out.outer = out.slack = out.near = out.met = out.noise = Wide{};
   Wide size{};
   for (int l = 0; l < kWidth; ++l) {
     if (!(open >> l & 1)) continue;
@@ -74,6 +75,7 @@ NURBS_INLINE Sides look(unsigned open, const Shape* const (&shape)[kWidth], cons
     out.outer[l] = r.outer;
     out.slack[l] = r.slack;
     out.near[l] = r.near;
+    out.met[l] = shape[l]->small_kinks.met;
     out.noise[l] = pole_noise(*shape[l], std::min(lu[l], lv[l]));
     dented[l] = dented[l] || (r.slack > kRoundoff * shape[l]->bounding_radius && !(r.near < kFarAway));
   }
@@ -97,8 +99,9 @@ NURBS_INLINE Sides look(unsigned open, const Shape* const (&shape)[kWidth], cons
 // this bounding radius.
 NURBS_INLINE Wide excess(const Sides& side, const Wide& radius, const Wide& least2, bool any_noise) {
   const Wide chord2 = any_noise ? widened_chord2(least2, side.noise) : least2;
-  const Wide rolling = 0.5 * side.outer * chord2, wedge = 2.0 * radius * root(chord2);
-  return select((chord2 <= kNormalMargin * kNormalMargin) & (side.near < kFarAway), 0.5 * side.near * chord2,
+  const Wide chord = root(chord2), rolling = 0.5 * side.outer * chord2, wedge = 2.0 * radius * chord;
+  const Wide near = side.near * (0.5 * chord2 + side.met * chord);
+  return select((chord2 <= kNormalMargin * kNormalMargin) & (side.near < kFarAway), near,
                 smaller(rolling, wedge) + side.slack);
 }
 

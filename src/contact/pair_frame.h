@@ -14,12 +14,13 @@ struct PairFrame {
   const Shape* a;
   const Shape* b;
   double scale_a, scale_b;
-  Mat3 axes_a;   // A's shape axes into the lab
-  Mat3 turn;     // B's shape axes into A's
-  Vec3 offset;   // B's centre of mass
-  double size;   // smaller bounding radius of the two, the scale of `tolerance`
-  double reach;  // larger of them, the scale of round-off
-  double noise;  // round-off of a length, and what the balls that touch the bodies may be off them by
+  Mat3 axes_a;      // A's shape axes into the lab
+  Mat3 turn;        // B's shape axes into A's
+  Vec3 offset;      // B's centre of mass
+  double size;      // smaller bounding radius of the two, the scale of `tolerance`
+  double reach;     // larger of them, the scale of round-off
+  double roundoff;  // of a length
+  double noise;     // that, and what the balls that touch the bodies may be off them by (small_kinks.h)
 
   PairFrame(const Particle& pa, const Particle& pb)
       : a(pa.shape), b(pb.shape), scale_a(pa.scale), scale_b(pb.scale), axes_a(pa.q.toRotationMatrix()) {
@@ -28,7 +29,8 @@ struct PairFrame {
     const double ra = scale_a * a->bounding_radius, rb = scale_b * b->bounding_radius;
     size = ra < rb ? ra : rb;
     reach = ra < rb ? rb : ra;
-    noise = kRoundoff * reach + scale_a * a->small_kinks.slack + scale_b * b->small_kinks.slack;
+    roundoff = kRoundoff * reach;
+    noise = roundoff + scale_a * a->small_kinks.slack + scale_b * b->small_kinks.slack;
   }
 
   // Whether points and a ball stand for a body of the pair, to little more than round-off of the tolerance.
@@ -40,6 +42,30 @@ struct PairFrame {
   static double rolling_ball(const Shape& shape, double scale, double tolerance) {
     const double least = std::min(shape.curvature.min_radius, shape.inner_radius);
     return scale * (is_swept(shape, scale, tolerance) ? std::max(least, shape.core.radius) : least);
+  }
+  // The same, but for a rise above the body (small_kinks.h). With a much smaller mate it is that one's size
+  // that counts.
+  struct RollingBall {
+    double radius, rise;
+  };
+  RollingBall ball_for_mate(const Shape& shape, double scale, double tolerance) const {
+    const double most = rolling_ball(shape, scale, tolerance), met = shape.small_kinks.met,
+                 slack = scale * shape.small_kinks.slack, enough = kMateSizes * size,
+                 rise = 2 * enough * met * met;
+    return rise < slack ? RollingBall{std::min(0.5 * most, enough), rise} : RollingBall{most, slack};
+  }
+  // Largest ball worth considering of those that touch a body, whose overlap with the other is `depth`. A
+  // flat part has none; one as large as the other body's reach does.
+  double largest_ball(const Shape& shape, double depth) const {
+    const double enough = kMateSizes * size;
+    return shape.small_kinks.slack > 0 && 2 * depth < enough ? std::min(reach, enough) : reach;
+  }
+  // By how much the gap may exceed that of balls of these radii that touch both bodies, their centres
+  // `distance` apart, besides round-off: of p >= rho - distance cos t - (rho_a beta_a + rho_b beta_b) sin t
+  // the least.
+  double rise_between(double rho_a, double rho_b, double distance) const {
+    const double met = rho_a * a->small_kinks.met + rho_b * b->small_kinks.met;
+    return std::min(noise - roundoff, 0.5 * met * met / distance);
   }
 
   Vec3 place_a(const Vec3& s) const { return scale_a * s; }

@@ -41,7 +41,7 @@ bool solve_warm(const Shape& shape, const Vec3& d, SurfacePoint at, double toler
     if (!next.on_patch()) return false;
     const double excess =
         support_excess(shape, 1, radii_at(shape, at, nullptr, n), d, n, pole_noise(shape, std::min(lu, lv)));
-    const double roundoff = kRoundoff * shape.bounding_radius + shape.small_kinks.slack;
+    const double roundoff = kRoundoff * shape.bounding_radius;
     if (excess <= tolerance &&
         (d - n).squaredNorm() * shape.bounding_radius <= std::max(tolerance, roundoff) &&
         turns_linearly(j, du, dv)) {

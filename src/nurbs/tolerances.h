@@ -125,7 +125,7 @@ constexpr double kNearKink = 1e-4;        // rad: whose profiles' pieces are in 
 
 // --- meridians
 constexpr double kMeridianError = 1e-10;   // of the body's size: patches this near a profile times an arc
-constexpr double kMeridianLack = 3.2e-15;  // ... are that to round-off if in all they are no further from it
+constexpr double kMeridianSame = 3.2e-15;  // ... are that to round-off if in all they are no further from it
 constexpr double kMeridianOver = 1e-9;     // rad, parameters: overlap of the patches round the axis
 constexpr int kMeridianStarts = 64;        // directions of its table
 constexpr int kMeridianSteps = 16;         // of Newton; 2 to 4 are usual
@@ -191,6 +191,7 @@ constexpr double kNoDirection =
 constexpr double kSingular = 1e-13;  // 2 x 2 determinant over the sum of its products' sizes
 constexpr double kStationary =
     1e-10;  // angle between the normals, and offset across them over the smaller radius
+constexpr double kMateSizes = 16;      // a body's, up to which balls that touch a larger mate serve
 constexpr double kUnequalSizes = 100;  // ratio of the bodies' from which the larger one's reach counts ...
 constexpr double kTurnRate = 1e3;  // ... of how fast normals change: that of a rim of its radius over this
 constexpr double kLargestStep = 0.35;  // of a patch's parameter range in one Newton step

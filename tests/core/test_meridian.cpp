@@ -9,6 +9,8 @@
 
 #include "body/near_revolution.h"
 #include "body/support.h"
+#include "contact/pair_search.h"
+#include "shapes/primitives.h"
 #include "shapes/revolved.h"
 #include "support/bodies.h"
 #include "support/flat_bodies.h"
@@ -148,6 +150,41 @@ TEST(Meridian, is_kept_with_its_error_where_a_body_is_a_little_off_round) {
   }
   EXPECT_LT(most, 2 * near->meridian.error + 1e-14);
   EXPECT_GT(near->meridian.error, 2e-13);
+}
+
+// Certified wrong, by 45 tolerances beside a sphere of 1e-3 of the size: weights of 1 / sqrt(2) cut after a
+// few digits make arcs that dip inside their circle, where points were taken that the body does not have.
+TEST(Meridian, circles_that_dip_inside_count) {
+  const std::shared_ptr<const Shape> ball = make_shape("ball", exact_ellipsoid(Vec3(1, 1, 1)));
+  for (const double w : {0.70710678, 0.707106781, 0.7071067811, 0.70710678118, 0.70710678119, 0.7071068}) {
+    NurbsSurface s = surface_of_revolution(1, {0, 0, 1. / 3, 2. / 3, 1, 1},
+                                           {{0, -1, 1}, {1, -1, 1}, {1, 1, 1}, {0, 1, 1}});
+    for (Vec4& p : s.points)
+      if (p[3] < 0.9) p = w * (p / p[3]).eval();
+    const std::shared_ptr<const Shape> cylinder = make_shape("cylinder", {s});
+    const long double exact = w;
+    const auto middle =
+        static_cast<double>(std::sqrt(2.0L) * (1 + 2 * exact) / (2 + 2 * exact));  // of the arc
+    if (!cylinder->meridian.empty()) {
+      EXPECT_GE(cylinder->meridian.error, std::abs(1 - middle) * (1 - 1e-3)) << w;
+    }
+    const Vec3 out = Vec3(1, 1, 0).normalized();
+    for (const double ratio : {0.7, 1e-2, 1e-3, 1e-6})
+      for (const double depth : {0.5, 0.1, 1e-3, -1e-6, -0.01})
+        for (const double tolerance : {1e-9, 1e-12}) {
+          SCOPED_TRACE(testing::Message() << w << " ratio " << ratio << " depth " << depth);
+          const double away = 1 + ratio - depth * ratio;
+          const Particle a{cylinder.get(), 1, Vec3::Zero(), Quat::Identity()},
+              b{ball.get(), ratio, away * out, Quat::Identity()};
+          double memory[kPairMemorySize] = {0};
+          ContactSettings settings;
+          settings.tolerance = tolerance;
+          const ContactResult r = find_contact(a, b, settings, memory);
+          const double gap = away - ratio - middle;
+          EXPECT_LE(r.lower, gap + 1e-15);
+          EXPECT_GE(r.upper, gap - 1e-15);
+        }
+  }
 }
 
 // Bodies of revolution whose files have few digits: solid, decimals.

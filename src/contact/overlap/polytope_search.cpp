@@ -45,8 +45,11 @@ PolytopeSearch::PolytopeSearch(const PairFrame& pair, double tolerance, double j
       points_b_(hull_points(*pair.b, pair.scale_b, tolerance)),
       error_(pair.scale_a * points_a_.error() + pair.scale_b * points_b_.error()),
       hull_(kSliver * pair.reach) {
-  shrink_a_ = PairFrame::rolling_ball(*pair.a, pair.scale_a, tolerance);
-  shrink_b_ = PairFrame::rolling_ball(*pair.b, pair.scale_b, tolerance);
+  const PairFrame::RollingBall ball_a = pair.ball_for_mate(*pair.a, pair.scale_a, tolerance),
+                               ball_b = pair.ball_for_mate(*pair.b, pair.scale_b, tolerance);
+  shrink_a_ = ball_a.radius;
+  shrink_b_ = ball_b.radius;
+  rise_ = ball_a.rise + ball_b.rise;
   points_ = points && PairFrame::is_swept(*pair.a, pair.scale_a, tolerance) &&
             PairFrame::is_swept(*pair.b, pair.scale_b, tolerance);
   if (points_) {

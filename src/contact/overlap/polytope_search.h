@@ -79,7 +79,7 @@ class PolytopeSearch {
   // directions within `valid` of it.
   PolytopeSearch(const PolytopeSearch& whole, int from, double valid, double shrink_a, double shrink_b);
 
-  double roundoff() const { return pair_.noise + 2 * joggle_ + error_; }
+  double roundoff() const { return pair_.roundoff + rise_ + 2 * joggle_ + error_; }
   // A point less high above a face than this is not worth adding: the bracket is as good as closed there.
   double least_height() const { return std::max(0.25 * roundoff(), kLeastHeight * tolerance_); }
   static HullPoints hull_points(const Shape& shape, double scale, double tolerance);
@@ -139,6 +139,7 @@ class PolytopeSearch {
   double shrink_a_, shrink_b_, shrink_;
   HullPoints points_a_, points_b_;
   double error_;         // of their points
+  double rise_ = 0;      // above the bodies, of what they are shrunk by
   bool points_ = false;  // are all that is left
   double valid_ = M_PI;  // what the cores hold for: directions within it of the middle
   Vec3 middle_ = Vec3::Zero();
