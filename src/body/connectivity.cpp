@@ -16,6 +16,7 @@ namespace {
 struct Edge {
   int patch = 0, edge = 0;
   std::array<Vec3, kEdgeSamples> at;  // points at t = 0, 1/4, .., 1
+  double length = 0;                  // how far its control points are from the first at most
   bool collapsed = false;
 };
 
@@ -24,11 +25,12 @@ Vec3 edge_point(const BezierPatch& patch, int edge, double t) {
   return evaluate0(patch, p[0], p[1]);
 }
 
-bool is_collapsed(const BezierPatch& patch, int edge, double tolerance) {
+double length_of(const BezierPatch& patch, int edge) {
   const std::vector<Vec4> net = edge_net(patch, edge);
   const Vec3 first = net[0].head<3>() / net[0][3];
-  return std::none_of(net.begin(), net.end(),
-                      [&](const Vec4& h) { return (h.head<3>() / h[3] - first).norm() > tolerance; });
+  double most = 0;
+  for (const Vec4& h : net) most = std::max(most, (h.head<3>() / h[3] - first).norm());
+  return most;
 }
 
 Edge make_edge(const BezierPatch& patch, int index, int edge, double tolerance) {
@@ -36,7 +38,8 @@ Edge make_edge(const BezierPatch& patch, int index, int edge, double tolerance) 
   e.patch = index;
   e.edge = edge;
   for (int k = 0; k < kEdgeSamples; ++k) e.at[k] = edge_point(patch, edge, k / (kEdgeSamples - 1.0));
-  e.collapsed = is_collapsed(patch, edge, tolerance);
+  e.length = length_of(patch, edge);
+  e.collapsed = e.length <= tolerance;
   return e;
 }
 
@@ -65,6 +68,8 @@ double closest_parameter(const BezierPatch& patch, int edge, const Vec3& x) {
 
 constexpr double kNoGap = 1e-6;        // of the tolerance: sides so near have the same parameters
 constexpr double kNotByChance = 1e-2;  // share of a gap that better parameters leave
+constexpr double kShortest = 1e-4;     // of the tolerance: shorter edges have no normals beside them
+constexpr double kShortGap = 1e-3;     // of a short edge: what its partner may be off
 
 double same_parameter_gap(const Edge& a, const Edge& b, bool reversed) {
   double gap = 0;
@@ -181,20 +186,24 @@ void add_candidates(const std::vector<BezierPatch>& patches, const std::vector<E
 }
 
 // All pairs of edges that agree. Edges are swept in the order of the x coordinate of the middle of their
-// ends, which does not depend on direction.
+// ends, which does not depend on direction. An edge no longer than the tolerance, as across a narrow band, is
+// one where another is the same to little of its length; else it is taken for a point.
 std::vector<Candidate> find_candidates(const std::vector<BezierPatch>& patches,
                                        const std::vector<Edge>& edges, double tolerance) {
   const auto key = [&](int e) { return 0.5 * (edges[e].at.front()[0] + edges[e].at.back()[0]); };
   std::vector<int> order;
   for (int e = 0; e < static_cast<int>(edges.size()); ++e) {
-    if (!edges[e].collapsed) order.push_back(e);
+    if (edges[e].length > kShortest * tolerance) order.push_back(e);
   }
   std::sort(order.begin(), order.end(),
             [&](int a, int b) { return key(a) != key(b) ? key(a) < key(b) : a < b; });
   std::vector<Candidate> out;
   for (size_t i = 0; i < order.size(); ++i) {
     for (size_t j = i + 1; j < order.size() && key(order[j]) - key(order[i]) <= tolerance; ++j) {
-      add_candidates(patches, edges, order[i], order[j], tolerance, out);
+      const Edge &a = edges[order[i]], &b = edges[order[j]];
+      if (a.collapsed != b.collapsed) continue;
+      const double allowed = a.collapsed ? kShortGap * std::min(a.length, b.length) : tolerance;
+      add_candidates(patches, edges, order[i], order[j], allowed, out);
     }
   }
   std::sort(out.begin(), out.end(), [](const Candidate& p, const Candidate& q) {

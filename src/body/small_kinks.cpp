@@ -8,7 +8,7 @@
 namespace nurbs {
 namespace {
 
-constexpr double kNoTilt = 1e-12;     // rad
+constexpr double kNoTilt = 1e-14;     // rad
 constexpr double kNoSlack = 4e-16;    // of the size: round-off
 constexpr double kMostSlack = 4e-13;  // ... and what may be given away
 constexpr double kLittle = 1e-2;      // of a radius of that size, to be lost before

@@ -679,6 +679,17 @@ TEST(Solids, of_few_digits_close_with_much_smaller_ones) {
   }
 }
 
+// Edges across a band narrower than the join tolerance counted as points: 16 times its width of slack, and
+// some hundred times the time of any contact.
+TEST(Solids, narrow_bands_are_joined) {
+  Random random(24);
+  for (const double half : {1e-4, 1e-6, 1e-7, 1e-8, 2e-9}) {
+    const auto body = test::capsule(random, 1, half).shape;
+    EXPECT_EQ(body->joint_slack, 0) << half;
+    EXPECT_FALSE(body->meridian.empty()) << half;
+  }
+}
+
 // Refused as dented by a sixth of their size: a fillet a few thousand digits wide ends at an angle to the
 // face that is large and makes a groove no deeper than the digits.
 TEST(Solids, small_fillets_of_few_digits_are_accepted) {

@@ -30,14 +30,21 @@ bool is_polar(const PairFrame& pair, const Vec3& d) {
 }
 
 // Rings and cells know few points of the bodies, which may not face each other where it takes three or four
-// to carry the contact.
+// to carry the contact, or where many directions are nearly level: then the supports along the best do.
 __attribute__((noinline)) void make_points_face(const PairFrame& pair, double tolerance, PolytopeResult* r) {
-  const auto off = [](const PolytopeResult& x) {
-    return (x.points.b - x.points.a).cross(x.bracket.direction).norm();
-  };
-  if (!(off(*r) > kFacing * pair.size)) return;
+  use_supports(pair, tolerance, r);
+  const double off = off_each_other(*r);
+  if (!(off > kFacing * pair.size)) return;
   PolytopeResult better = *r;
-  if (PolytopeSearch(pair, tolerance, 0.0, false).find_points(&better) && off(better) < off(*r)) *r = better;
+  if (PolytopeSearch(pair, tolerance, 0.0, false).find_points(&better) && off_each_other(better) < off)
+    *r = better;
+}
+
+// What the gap is at most, by the balls about the centres inside: of two nearly round bodies more than a hull
+// of points can say.
+double gap_of_inner_balls(const PairFrame& pair) {
+  return pair.offset.norm() - pair.scale_a * pair.a->inner_radius - pair.scale_b * pair.b->inner_radius +
+         pair.roundoff;
 }
 
 bool has_rings(const Shape& shape) {
@@ -45,7 +52,8 @@ bool has_rings(const Shape& shape) {
 }
 
 // What two attempts know together: the narrower one's points, along the direction of the higher lower end.
-PolytopeResult both(const PolytopeResult& x, const PolytopeResult& y, double tolerance) {
+PolytopeResult both(const PairFrame& pair, const PolytopeResult& x, const PolytopeResult& y,
+                    double tolerance) {
   PolytopeResult r = y.bracket.width() < x.bracket.width() ? y : x;
   const Bracket& higher = y.bracket.lower > x.bracket.lower ? y.bracket : x.bracket;
   r.bracket.lower = higher.lower;
@@ -54,6 +62,7 @@ PolytopeResult both(const PolytopeResult& x, const PolytopeResult& y, double tol
   r.points.nb = -higher.direction;
   r.converged = r.bracket.width() <= tolerance;
   set_gap(&r);
+  use_supports(pair, tolerance, &r);
   return r;
 }
 
@@ -76,6 +85,7 @@ PolytopeResult solve_polytope(const PairFrame& pair, const Vec3& seed, double to
   if (search_segments(pair, tolerance, &best) || search_ball_hulls(pair, tolerance, &best, &upper) ||
       search_segment_in_ellipsoid(pair, seed, tolerance, &best))
     return best;
+  upper = std::min(upper, gap_of_inner_balls(pair));
   // Where parts of the bodies are parts of balls, those tell more.
   const bool near = are_near_balls(pair),
              near_first = near && !pair.a->inner_balls.found() && !pair.b->inner_balls.found();
@@ -124,14 +134,15 @@ PolytopeResult solve_polytope(const PairFrame& pair, const Vec3& seed, double to
     }
     const PolytopeResult result = search.result();
     const int spent = attempt > 0 ? best.iterations : 0;
-    best = attempt == 0 || result.converged ? result : both(best, result, tolerance);
+    best = attempt == 0 || result.converged ? result : both(pair, best, result, tolerance);
     best.iterations = spent + result.iterations;
     if (best.converged || best.bracket.lower > enough || (started && !search.stalled())) break;
     from = best.bracket.direction + kHullTurn * (attempt + 1) * Vec3(0.36, -0.48, 0.8);
   }
   if (!best.converged && !(best.bracket.lower > enough) && best.bracket.lower != searched)
     search_last(pair, tolerance, &best);
-  if (near && !best.converged && !(best.bracket.lower > enough)) best = both(best, among_balls(), tolerance);
+  if (near && !best.converged && !(best.bracket.lower > enough))
+    best = both(pair, best, among_balls(), tolerance);
   return best;
 }
 

@@ -19,10 +19,27 @@ void set_gap(PolytopeResult* r) {
   part_points(r);
 }
 
+double off_each_other(const PolytopeResult& r) {
+  return (r.points.b - r.points.a).cross(r.points.na).norm();
+}
+
+void use_supports(const PairFrame& pair, double tolerance, PolytopeResult* r) {
+  const double off = off_each_other(*r);
+  if (!(off > kFacing * pair.size)) return;
+  PolytopeResult better = *r;
+  const auto [a, b] = hull_supports(pair, r->points.na, nullptr, nullptr, tolerance);
+  better.points = {a.where,      b.where,     pair.place_a(a.point), pair.place_b(b.point),
+                   r->points.na, r->points.nb};
+  part_points(&better);
+  if (off_each_other(better) < off) *r = better;
+}
+
 PolytopeResult PolytopeSearch::result() {
   Vec3 a, b;
   find_witness(&a, &b);
-  return with_points(a, b);
+  PolytopeResult r = with_points(a, b);
+  use_supports(pair_, tolerance_, &r);
+  return r;
 }
 
 bool PolytopeSearch::find_points(PolytopeResult* r) {

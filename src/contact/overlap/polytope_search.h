@@ -17,6 +17,12 @@ namespace nurbs {
 // least overlap seen: the hull errs to first order, the direction to second.
 void set_gap(PolytopeResult* r);
 
+// How far the points are from lying on one line along the normal.
+double off_each_other(const PolytopeResult& r);
+// Where that is far: the supports along the normal, if they do better. Points in the middle of others are off
+// the bodies where many directions are nearly level and few were asked.
+void use_supports(const PairFrame& pair, double tolerance, PolytopeResult* r);
+
 constexpr double kFacing = 1e-6;  // of the smaller body: witnesses may be off each other by
 
 class PolytopeSearch {
