@@ -19,6 +19,8 @@ constexpr int kBeforeRings = 64;      // queries before rings of directions are 
 constexpr int kBentBeforeRings = 95;  // ... of bodies without sharp edges, which caps may do for ...
 constexpr int kAtPoles = 256;         // ... and where the least overlap is along an axis
 constexpr double kPolar = 0.1;        // sine of the angle from it
+constexpr double kOneCentre =
+    0.03;  // of the balls' radii inside: nearly balls further apart have one direction
 
 // Along an axis of revolution, where a ring of directions is hardly one.
 bool is_polar(const PairFrame& pair, const Vec3& d) {
@@ -40,11 +42,14 @@ __attribute__((noinline)) void make_points_face(const PairFrame& pair, double to
     *r = better;
 }
 
+double inner_radii(const PairFrame& pair) {
+  return pair.scale_a * pair.a->inner_radius + pair.scale_b * pair.b->inner_radius;
+}
+
 // What the gap is at most, by the balls about the centres inside: of two nearly round bodies more than a hull
 // of points can say.
 double gap_of_inner_balls(const PairFrame& pair) {
-  return pair.offset.norm() - pair.scale_a * pair.a->inner_radius - pair.scale_b * pair.b->inner_radius +
-         pair.roundoff;
+  return pair.offset.norm() - inner_radii(pair) + pair.roundoff;
 }
 
 bool has_rings(const Shape& shape) {
@@ -88,7 +93,8 @@ PolytopeResult solve_polytope(const PairFrame& pair, const Vec3& seed, double to
   upper = std::min(upper, gap_of_inner_balls(pair));
   // Where parts of the bodies are parts of balls, those tell more.
   const bool near = are_near_balls(pair),
-             near_first = near && !pair.a->inner_balls.found() && !pair.b->inner_balls.found();
+             near_first = near && pair.offset.norm() < kOneCentre * inner_radii(pair) &&
+                          !pair.a->inner_balls.found() && !pair.b->inner_balls.found();
   const auto among_balls = [&]() -> const PolytopeResult& {
     if (!*balls) search_near_balls(pair, tolerance, &balls->emplace());
     return **balls;
