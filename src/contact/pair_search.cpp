@@ -161,12 +161,13 @@ class Ladder {
 
   // A contact on a crease or over a dent, where the surfaces have no common normal.
   bool meet_edge(const PairFrame& pair, double tolerance, JointSolution* s, ContactResult* r) {
-    if (memory_.proof.contact == 0 || !has_proof(memory_.proof) || (pair.a->smooth && pair.b->smooth))
-      return false;
+    if (memory_.proof.contact == 0 || !has_proof(memory_.proof)) return false;
+    const bool creased = !pair.a->smooth || !pair.b->smooth, dented = pair.a->dented() || pair.b->dented();
+    if (!creased && (!dented || is_too_deep(*s))) return false;
     const Vec3 d = last_direction(pair);
     Bridge bridge;
     if (!meet_bridge(pair, d, tolerance, settings_.tolerance, s, &bridge) &&
-        !meet_crease(pair, d, tolerance, settings_.tolerance, s))
+        !(creased && meet_crease(pair, d, tolerance, settings_.tolerance, s)))
       return false;
     *r = finish(pair, *s, s->normal, Rung::warm, s->iterations);
     if (bridge.known()) remember_bridge(bridge, *r);

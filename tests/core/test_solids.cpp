@@ -714,6 +714,33 @@ TEST(SavedCases, a_normal_beside_a_pole) {
   EXPECT_NEAR(overlap, -r.gap, 1e-10);
 }
 
+// A hollow of 2.4e-8 along the side, which is a cone's but for a hand's digits: each step took the polytope.
+TEST(SavedCases, contacts_on_a_shallow_hollow_go_on) {
+  const auto pill = read_shape_file("tests/cases/shape-pill-of-7-decimals.json");
+  const auto ball = make_shape("ball", exact_ellipsoid(Vec3(1, 1, 1)));
+  Random random(25);
+  int others = 0, steps = 0;
+  for (int k = 0; k < 10; ++k) {
+    const Particle a{pill.get(), 1, Vec3::Zero(), random.turn()};
+    const double azimuth = random.uniform(0, 2 * M_PI), c = 0.25, r = std::sqrt(1 - c * c);
+    const Vec3 out = a.q * Vec3(r * std::cos(azimuth), r * std::sin(azimuth), c);
+    Particle b{ball.get(), random.uniform(0.3, 2), Vec3::Zero(), random.turn()};
+    b.x = (test::overlap_along(a, b, out) - 1e-3 * b.scale) * out;
+    const Vec3 way = 1e-4 * random.direction();
+    double memory[kPairMemorySize] = {0};
+    for (int step = 0; step < 20; ++step, b.x += way) {
+      const ContactResult result = find_contact(a, b, {}, memory);
+      ASSERT_EQ(result.status, Status::converged);
+      EXPECT_GE(result.upper, -test::overlap_along(a, b, result.normal) - 1e-14);
+      EXPECT_NEAR(result.gap, -test::overlap_along(a, b, result.normal), 1e-9);
+      if (step == 0) continue;
+      ++steps;
+      others += result.rung == Rung::fallback;
+    }
+  }
+  EXPECT_LE(others, steps / 10);
+}
+
 // Missed: corner supports of patches with a collapsed edge.
 TEST(SavedCases, polyhedron_tumbling_on_a_plane) {
   const auto shape = saved_shape("shape-polyhedron-plane.json");
