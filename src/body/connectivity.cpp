@@ -68,7 +68,6 @@ double closest_parameter(const BezierPatch& patch, int edge, const Vec3& x) {
 
 constexpr double kNoGap = 1e-6;        // of the tolerance: sides so near have the same parameters
 constexpr double kNotByChance = 1e-2;  // share of a gap that better parameters leave
-constexpr double kShortest = 1e-4;     // of the tolerance: shorter edges have no normals beside them
 constexpr double kShortGap = 1e-3;     // of a short edge: what its partner may be off
 
 double same_parameter_gap(const Edge& a, const Edge& b, bool reversed) {
@@ -193,7 +192,7 @@ std::vector<Candidate> find_candidates(const std::vector<BezierPatch>& patches,
   const auto key = [&](int e) { return 0.5 * (edges[e].at.front()[0] + edges[e].at.back()[0]); };
   std::vector<int> order;
   for (int e = 0; e < static_cast<int>(edges.size()); ++e) {
-    if (edges[e].length > kShortest * tolerance) order.push_back(e);
+    if (edges[e].length > kShortestEdge * tolerance) order.push_back(e);
   }
   std::sort(order.begin(), order.end(),
             [&](int a, int b) { return key(a) != key(b) ? key(a) < key(b) : a < b; });

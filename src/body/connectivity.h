@@ -65,6 +65,9 @@ inline SurfacePoint across(const std::vector<BezierPatch>& patches, const EdgeLi
   return {link.patch, there[0], there[1]};
 }
 
+constexpr double kShortestEdge =
+    1e-4;  // of the tolerance: shorter edges are points, beside which there are no normals
+
 struct UnmatchedEdge {
   int patch = -1, edge = -1;                  // an edge that nothing lies on; -1 when every edge is matched
   int nearest_patch = -1, nearest_edge = -1;  // the free edge that comes closest ...

@@ -115,7 +115,7 @@ std::vector<bool> sides_to_turn(const Draft& draft) {
     throw ShapeError(
         "patch " + std::to_string(i) +
         " is not connected to patch 0: the surfaces bound more than one body, or are joined by faces of " +
-        number(kJoinTolerance) + " of its size");
+        number(kShortestEdge * kJoinTolerance) + " of its size");
   }
   return turned;
 }
