@@ -307,7 +307,7 @@ TEST(Connectivity, TwoBodiesAreRefused) {
   EXPECT_EQ(
       error_of(body),
       "body: patch 6 is not connected to patch 0: the surfaces bound more than one body, or are joined by "
-      "faces of 1e-06 of its size");
+      "faces of 1e-10 of its size");
 }
 
 TEST(Connectivity, OneSidedSurfaceIsRefused) {
