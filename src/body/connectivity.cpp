@@ -25,20 +25,12 @@ Vec3 edge_point(const BezierPatch& patch, int edge, double t) {
   return evaluate0(patch, p[0], p[1]);
 }
 
-double length_of(const BezierPatch& patch, int edge) {
-  const std::vector<Vec4> net = edge_net(patch, edge);
-  const Vec3 first = net[0].head<3>() / net[0][3];
-  double most = 0;
-  for (const Vec4& h : net) most = std::max(most, (h.head<3>() / h[3] - first).norm());
-  return most;
-}
-
 Edge make_edge(const BezierPatch& patch, int index, int edge, double tolerance) {
   Edge e;
   e.patch = index;
   e.edge = edge;
   for (int k = 0; k < kEdgeSamples; ++k) e.at[k] = edge_point(patch, edge, k / (kEdgeSamples - 1.0));
-  e.length = length_of(patch, edge);
+  e.length = 0.5 * bound_collapsed_edge(patch, edge);
   e.collapsed = e.length <= tolerance;
   return e;
 }

@@ -190,8 +190,8 @@ bool meet_bridge(const PairFrame& pair, const Vec3& direction, double tolerance,
                                              {*pair.b, pair.scale_b, on_b.d, points.on_b}, tolerance) -
                            d.dot(pair.offset);
       const auto ball_at = [&](const Branch& of, bool of_a) {
-        return of_a ? touching_ball(pair, *pair.a, of.where(), of.normal(), pair.scale_a, on_a.d)
-                    : touching_ball(pair, *pair.b, of.where(), of.normal(), pair.scale_b, on_b.d);
+        return of_a ? touching_ball(*pair.a, of.where(), of.normal(), pair.scale_a, on_a.d)
+                    : touching_ball(*pair.b, of.where(), of.normal(), pair.scale_b, on_b.d);
       };
       // Between two balls of one radius rolls a third.
       const TouchingBall two[2] = {ball_at(at.two[0], at.of_a), ball_at(at.two[1], at.of_a)};

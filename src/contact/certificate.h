@@ -106,11 +106,10 @@ inline Bracket certify(const PairFrame& pair, const PointPair& p, double noise_a
     return radii.slack > kRoundoff * shape.bounding_radius && !(radii.near < kFarAway);
   };
   bracket.dented = dented(*pair.a, radii_a) || dented(*pair.b, radii_b);
-  const double slack = pair.scale_a * pair.a->joint_slack + pair.scale_b * pair.b->joint_slack;
   const auto beside = [&](double rho, double noise, const Vec3& out) {
     return noise > 0 ? ball_beside(rho, std::min(noise, 1.0), (d - out).norm(), distance) : 0;
   };
-  bracket.upper = distance - rho_a - rho_b + slack + pair.roundoff +
+  bracket.upper = distance - rho_a - rho_b + pair.joint_slack() + pair.roundoff +
                   pair.rise_between(rho_a, rho_b, distance) + beside(rho_a, noise_a, p.na) +
                   beside(rho_b, noise_b, -p.nb);
   bracket.lower = d.dot(p.b - p.a) - support_excess(*pair.a, pair.scale_a, radii_a, d, p.na, noise_a) -

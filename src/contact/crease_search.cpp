@@ -35,8 +35,8 @@ bool meet_crease(const PairFrame& pair, const Vec3& direction, double tolerance,
     p.on_b = sb.where;
     const double upper = pair.overlap_along(d, sa.upper, sb.upper);
     const Bracket bracket =
-        bracket_along(pair, d, upper, p, touching_ball(pair, *pair.a, sa.where, sa.normal, pair.scale_a, d),
-                      touching_ball(pair, *pair.b, sb.where, sb.normal, pair.scale_b, on_b));
+        bracket_along(pair, d, upper, p, touching_ball(*pair.a, sa.where, sa.normal, pair.scale_a, d),
+                      touching_ball(*pair.b, sb.where, sb.normal, pair.scale_b, on_b));
     const Vec3 g = p.a - p.b, t = d.unitOrthogonal(), across = d.cross(t);
     Mat2 wa, wb;
     if (!turn_a(pair, sa, d, t, across, &wa) || !turn_b(pair, sb, on_b, t, across, &wb)) return false;

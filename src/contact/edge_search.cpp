@@ -253,8 +253,8 @@ double gap_of_edges(const PairFrame& pair, const Side& a, const Side& b, const V
   const double lambda = 0.5 * (1 - kOffShare) * least;
   if (!(lambda > depth)) return kFarAway;
   const double c = depth / lambda - 1, along = pair.offset.dot(n), across = (pair.offset - along * n).norm();
-  const double inner = pair.scale_a * pair.a->inner_radius + pair.scale_b * pair.b->inner_radius;
-  if (!(along >= 0) || !(inner - along * c - across * std::sqrt(1 - c * c) >= depth)) return kFarAway;
+  if (!(along >= 0) || !(pair.inner_radii() - along * c - across * std::sqrt(1 - c * c) >= depth))
+    return kFarAway;
   return -depth + off * off / (2 * kOffShare * least);
 }
 
@@ -307,15 +307,14 @@ bool meet(const PairFrame& pair, Side a, Side b, const Vec3& direction, double t
   if (edges) {
     const Vec3 g = p.a - p.b;
     const double depth = n.dot(g);
-    most = gap_of_edges(pair, a, b, n, depth, (g - depth * n).norm()) + kRoundoff * pair.reach +
-           pair.scale_a * pair.a->joint_slack + pair.scale_b * pair.b->joint_slack;
+    most = gap_of_edges(pair, a, b, n, depth, (g - depth * n).norm()) + pair.roundoff + pair.joint_slack();
     if (!(most < kFarAway)) return false;
   }
   const auto [top_a, top_b] = hull_supports(pair, n, &a.at, &b.at, tolerance);
   const double overlap = pair.overlap_along(n, top_a.upper, top_b.upper);
   const double enough = std::max(kRoomyBall * std::abs(n.dot(p.a - p.b)), kLeastBall * pair.size);
   const auto ball = [&](const Side& side, const Vec3& d) {
-    return side.feature.freedom == 2 ? touching_ball(pair, *side.shape, side.at, d, side.scale, d, enough)
+    return side.feature.freedom == 2 ? touching_ball(*side.shape, side.at, d, side.scale, d, enough)
                                      : TouchingBall{0, d};
   };
   const Bracket bracket =

@@ -30,8 +30,7 @@ bool is_least(const PairFrame& pair, const Vec3& n, double overlap, double m) {
 bool meet_along(const PairFrame& pair, const Vec3& n, const PointPair& points, double excess, double slack,
                 double tolerance, JointSolution* s) {
   const double gap = n.dot(points.b - points.a);
-  const double noise = slack + pair.scale_a * pair.a->joint_slack + pair.scale_b * pair.b->joint_slack +
-                       kRoundoff * pair.reach;
+  const double noise = slack + pair.joint_slack() + pair.roundoff;
   const Bracket bracket{gap - excess - noise, gap + noise, n, 0, 0};
   if (!(bracket.width() <= tolerance)) return false;
   s->set_met(points, bracket, 1);

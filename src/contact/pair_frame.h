@@ -20,7 +20,8 @@ struct PairFrame {
   double size;      // smaller bounding radius of the two, the scale of `tolerance`
   double reach;     // larger of them, the scale of round-off
   double roundoff;  // of a length
-  double noise;     // that, and what the balls that touch the bodies may be off them by (small_kinks.h)
+  double rise;      // what the balls that touch the bodies may be above them (small_kinks.h)
+  double noise;     // both
 
   PairFrame(const Particle& pa, const Particle& pb)
       : a(pa.shape), b(pb.shape), scale_a(pa.scale), scale_b(pb.scale), axes_a(pa.q.toRotationMatrix()) {
@@ -30,7 +31,8 @@ struct PairFrame {
     size = ra < rb ? ra : rb;
     reach = ra < rb ? rb : ra;
     roundoff = kRoundoff * reach;
-    noise = roundoff + scale_a * a->small_kinks.slack + scale_b * b->small_kinks.slack;
+    rise = scale_a * a->small_kinks.slack + scale_b * b->small_kinks.slack;
+    noise = roundoff + rise;
   }
 
   // Whether points and a ball stand for a body of the pair, to little more than round-off of the tolerance.
@@ -64,9 +66,15 @@ struct PairFrame {
   // `distance` apart, besides round-off: of p >= rho - distance cos t - (rho_a beta_a + rho_b beta_b) sin t
   // the least.
   double rise_between(double rho_a, double rho_b, double distance) const {
+    if (!(rise > 0)) return 0;
     const double met = rho_a * a->small_kinks.met + rho_b * b->small_kinks.met;
-    return std::min(noise - roundoff, 0.5 * met * met / distance);
+    return std::min(rise, 0.5 * met * met / distance);
   }
+
+  // Sides of joints that do not meet, of both (Shape::joint_slack).
+  double joint_slack() const { return scale_a * a->joint_slack + scale_b * b->joint_slack; }
+  // Of the balls about the centres inside, both.
+  double inner_radii() const { return scale_a * a->inner_radius + scale_b * b->inner_radius; }
 
   Vec3 place_a(const Vec3& s) const { return scale_a * s; }
   Vec3 place_b(const Vec3& s) const { return offset + scale_b * (turn * s); }

@@ -118,15 +118,11 @@ TEST(SmallKinks, count_by_a_smaller_mates_size) {
       double memory[kPairMemorySize] = {0};
       const ContactResult r = find_contact(a, b, {}, memory);
       EXPECT_EQ(r.status, Status::converged) << ratio << " pair " << k;
-      std::vector<Vec3> starts;
-      for (double beside = 1e-9; beside < 1; beside *= 10)
-        for (int i = 0; i < 4; ++i) starts.push_back((r.normal + beside * random.direction()).normalized());
-      starts.push_back(r.normal);
       const double least = test::least_overlap(
           [&](const Vec3& along) {
             return (test::support_of(solid, a, along) - test::support_of(solid, b, -along) - b.x).dot(along);
           },
-          starts, {}, random);
+          test::starts_beside(r.normal, 1, random), {}, random);
       EXPECT_LE(-r.upper, least + 1e-15) << ratio << " pair " << k;
       EXPECT_LE(least, -r.lower + 1e-9 * ratio + 4e-15) << ratio << " pair " << k;
     }

@@ -671,9 +671,7 @@ TEST(Solids, of_few_digits_close_with_much_smaller_ones) {
       double memory[kPairMemorySize] = {0};
       const ContactResult r = find_contact(a, b, {}, memory);
       EXPECT_EQ(r.status, Status::converged);
-      std::vector<Vec3> starts = {r.normal};
-      for (double beside = 1e-9; beside < 2; beside *= 10)
-        for (int i = 0; i < 4; ++i) starts.push_back((r.normal + beside * random.direction()).normalized());
+      const std::vector<Vec3> starts = test::starts_beside(r.normal, 2, random);
       EXPECT_LE(-r.upper, test::least_overlap(overlap, starts, {}, random) + 1e-15);
     }
   }

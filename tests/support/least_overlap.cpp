@@ -17,6 +17,13 @@ const std::vector<Vec3>& spiral(int count) {
   return directions;
 }
 
+std::vector<Vec3> starts_beside(const Vec3& d, double widest, Random& random) {
+  std::vector<Vec3> starts = {d};
+  for (double beside = 1e-9; beside < widest; beside *= 10)
+    for (int i = 0; i < 4; ++i) starts.push_back((d + beside * random.direction()).normalized());
+  return starts;
+}
+
 double least_overlap(const std::function<double(const Vec3&)>& p, const std::vector<Vec3>& starts,
                      const Compass& compass, Random& random) {
   struct Place {

@@ -10,6 +10,8 @@ namespace nurbs::test {
 
 // Unit directions spread evenly over the sphere.
 const std::vector<Vec3>& spiral(int count);
+// d, and four each about 1e-9, 1e-8, .. beside it, below `widest` (rad, but for large ones).
+std::vector<Vec3> starts_beside(const Vec3& d, double widest, Random& random);
 
 // A compass that turns at random: it moves to the best of four directions a stride (rad) away.
 struct Compass {

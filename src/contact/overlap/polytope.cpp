@@ -42,14 +42,10 @@ __attribute__((noinline)) void make_points_face(const PairFrame& pair, double to
     *r = better;
 }
 
-double inner_radii(const PairFrame& pair) {
-  return pair.scale_a * pair.a->inner_radius + pair.scale_b * pair.b->inner_radius;
-}
-
 // What the gap is at most, by the balls about the centres inside: of two nearly round bodies more than a hull
 // of points can say.
 double gap_of_inner_balls(const PairFrame& pair) {
-  return pair.offset.norm() - inner_radii(pair) + pair.roundoff;
+  return pair.offset.norm() - pair.inner_radii() + pair.roundoff;
 }
 
 bool has_rings(const Shape& shape) {
@@ -93,7 +89,7 @@ PolytopeResult solve_polytope(const PairFrame& pair, const Vec3& seed, double to
   upper = std::min(upper, gap_of_inner_balls(pair));
   // Where parts of the bodies are parts of balls, those tell more.
   const bool near = are_near_balls(pair),
-             near_first = near && pair.offset.norm() < kOneCentre * inner_radii(pair) &&
+             near_first = near && pair.offset.norm() < kOneCentre * pair.inner_radii() &&
                           !pair.a->inner_balls.found() && !pair.b->inner_balls.found();
   const auto among_balls = [&]() -> const PolytopeResult& {
     if (!*balls) search_near_balls(pair, tolerance, &balls->emplace());

@@ -40,7 +40,7 @@ double PolytopeSearch::cover(int v) {
   if (joggle_ > 0 || hull_.points() == kHullVertices || !(level > tolerance_)) return 0;
   const auto [a, b] = bends_at(v, t, s);
   const double y0 = d.dot(g), slope = (g - y0 * d).norm() + pair_.noise,
-               over = std::max(0.0, w.p - shrink_ - y0) + roundoff() + (pair_.noise - pair_.roundoff);
+               over = std::max(0.0, w.p - shrink_ - y0) + roundoff() + pair_.rise;
   double angle = 0;
   for (double to = kWidestCap; to > kLeastCap; to *= kNextCap) {
     double rate = 0;
@@ -133,7 +133,7 @@ PolytopeSearch::PolytopeSearch(const PolytopeSearch& whole, int from, double val
       points_a_(whole.points_a_),
       points_b_(whole.points_b_),
       error_(whole.error_),
-      rise_(whole.pair_.noise - whole.pair_.roundoff),
+      rise_(whole.pair_.rise),
       valid_(valid),
       middle_(whole.witness_[from].d),
       hull_(kSliver * whole.pair_.reach) {
