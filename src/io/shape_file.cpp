@@ -120,6 +120,13 @@ NurbsSurface parse_surface(const Json& data, const Place& place) {
   return s;
 }
 
+// Says that it is rational, and not how.
+bool has_lost_weights(const Json& data) {
+  if (!data.contains("rational") || data["rational"] != true) return false;
+  const Json& net = data["control_points"];
+  return !net.contains("weights") || net["weights"].is_null();
+}
+
 Mat3 parse_gyration(const Json& root, const Place& place) {
   const std::vector<double> g = numbers(root, "gyration", place);
   if (g.size() != 6)
@@ -218,6 +225,10 @@ ShapeFileContent parse_shape(const std::string& text, const std::string& file) {
     content.surfaces.push_back(parse_surface(data[i], {file + ": patch " + std::to_string(i) + ": "}));
   }
   if (root.contains("gyration")) content.gyration = parse_gyration(root, top);
+  if (const size_t lost = std::count_if(data.begin(), data.end(), has_lost_weights); lost > 0)
+    content.warnings.push_back("\"rational\" is true, but " + std::to_string(lost) + " of " +
+                               std::to_string(data.size()) +
+                               " patches have no \"weights\"; theirs are taken as 1");
   return content;
 }
 
@@ -244,6 +255,7 @@ std::shared_ptr<const Shape> read_shape_file(const std::string& file, std::vecto
     throw ShapeError(with_file(error.what()));
   }
   if (warnings) {
+    for (const std::string& w : content.warnings) warnings->push_back(file + ": " + w);
     for (const std::string& w : found) warnings->push_back(with_file(w));
   }
   return shape;

@@ -13,6 +13,7 @@ namespace nurbs {
 struct ShapeFileContent {
   std::vector<NurbsSurface> surfaces;
   std::optional<Mat3> gyration;
+  std::vector<std::string> warnings = {};  // of what was read; without the file's name
 };
 
 // Parses and validates the text of a shape file; `file` is only used to word errors. Points are Cartesian,

@@ -118,6 +118,7 @@ std::vector<ShapeLibrary::Made> ShapeLibrary::make(const std::vector<std::size_t
       const std::size_t k = mine[n];
       try {
         auto content = nurbs::parse_shape(sources_[k].text, sources_[k].file);
+        made[k].warnings = content.warnings;
         made[k].shape = nurbs::make_shape(sources_[k].name, std::move(content.surfaces), content.gyration,
                                           &made[k].warnings);
         if (mapped) made[k].shape->inner_map();

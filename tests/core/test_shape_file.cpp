@@ -109,10 +109,18 @@ TEST(ShapeFile, WeightsAreOptionalAndPointsCartesian) {
   Json root = box_json();
   Json& net = root["shape"]["data"][0]["control_points"];
   net.erase("weights");
-  EXPECT_EQ(parse_shape(root.dump(), "stone.json").surfaces[0].points[3][3], 1);
+  const ShapeFileContent without = parse_shape(root.dump(), "stone.json");
+  EXPECT_EQ(without.surfaces[0].points[3][3], 1);
+  EXPECT_EQ(without.warnings, std::vector<std::string>{
+                                  "\"rational\" is true, but 1 of 6 patches have no \"weights\"; theirs are "
+                                  "taken as 1"});
+  root["shape"]["data"][0]["rational"] = false;
+  EXPECT_TRUE(parse_shape(root.dump(), "stone.json").warnings.empty());
   net["weights"] = {1, 1, 1, 2};
   net["points"][3] = {1, 2, 3};
-  EXPECT_EQ(parse_shape(root.dump(), "stone.json").surfaces[0].points[3], Vec4(2, 4, 6, 2));
+  const ShapeFileContent weighted = parse_shape(root.dump(), "stone.json");
+  EXPECT_EQ(weighted.surfaces[0].points[3], Vec4(2, 4, 6, 2));
+  EXPECT_TRUE(weighted.warnings.empty());
 }
 
 TEST(ShapeFile, NameIsTheStemAndTheBodyIsBuilt) {
