@@ -243,6 +243,23 @@ std::string write_shape(const ShapeFileContent& content) {
   return root.dump(1) + "\n";
 }
 
+int few_decimals(const std::vector<NurbsSurface>& surfaces) {
+  constexpr int kMost = 10;
+  int decimals = 0;
+  double unit = 1;
+  for (const NurbsSurface& s : surfaces)
+    for (const Vec4& p : s.points)
+      for (int c = 0; c < 3; ++c) {
+        const double x = p[c] / p[3];
+        const auto whole = [&] {
+          return std::abs(x * unit - std::round(x * unit)) <= 1e-15 * unit * std::abs(x);
+        };
+        for (; !whole(); unit *= 10)
+          if (++decimals > kMost) return 0;
+      }
+  return decimals;
+}
+
 std::shared_ptr<const Shape> read_shape_file(const std::string& file, std::vector<std::string>* warnings) {
   ShapeFileContent content = parse_shape(read_text(file), file);
   const std::string name = std::filesystem::path(file).stem().string();

@@ -26,6 +26,9 @@ ShapeFileContent parse_shape(const std::string& text, const std::string& file);
 // off, once.
 std::string write_shape(const ShapeFileContent& content);
 
+// The decimals that all coordinates of the control points get by with; 0 where those are more than 10.
+int few_decimals(const std::vector<NurbsSurface>& surfaces);
+
 // Reads `file` and builds its shape; the shape's name is the file's stem. Throws ShapeError; errors and
 // warnings begin with "FILE: ".
 std::shared_ptr<const Shape> read_shape_file(const std::string& file,

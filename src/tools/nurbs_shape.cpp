@@ -50,6 +50,8 @@ constexpr char kInertiaNotes[] =
     "is printed; with --density the mass follows; with both the mass is met and the density must agree to "
     "0.1 %.";
 
+constexpr double kNoDent = 1e-12;  // of the bounding radius: shallower, contacts cost as without
+
 // --- Options
 // -------------------------------------------------------------------------------------------------
 
@@ -718,6 +720,16 @@ void print_form(const Shape& shape) {
               static_cast<double>(memory(shape)) / 1024);
 }
 
+// Where the dents are what rounding the control points left; "" elsewhere.
+std::string blame_on_decimals(const Shape& shape) {
+  const int decimals = few_decimals(shape.surfaces);
+  if (decimals == 0 || !(shape.concavity > kNoDent * shape.bounding_radius) ||
+      shape.concavity > std::pow(10.0, -decimals))
+    return "";
+  return "the dents are what its " + std::to_string(decimals) +
+         " decimals leave; with 11 or more straight sides are straight, and contacts along them cheaper";
+}
+
 void info(const std::string& file) {
   std::vector<std::string> warnings;
   const auto shape = read_shape_file(file, &warnings);
@@ -728,6 +740,8 @@ void info(const std::string& file) {
   print_form(*shape);
   print_descriptors(*shape);
   print_cost(*shape);
+  const std::string blame = blame_on_decimals(*shape);
+  if (!blame.empty()) std::printf("digits             %s\n", blame.c_str());
 }
 
 void check(const std::string& file) {
@@ -739,6 +753,8 @@ void check(const std::string& file) {
               file.c_str(), warnings.empty() ? ", convex" : "", shape->surfaces.size(),
               std::max(kinks.opening, kinks.closing), shape->concavity);
   for (const std::string& line : describe_proofs(*shape)) std::printf("  %s\n", line.c_str());
+  const std::string blame = blame_on_decimals(*shape);
+  if (!blame.empty()) std::printf("  %s\n", blame.c_str());
 }
 
 // Sub-command `make`, with one of its own for every kind of body.

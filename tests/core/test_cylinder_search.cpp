@@ -11,6 +11,7 @@
 #include "support/bodies.h"
 #include "support/flat_bodies.h"
 #include "support/random.h"
+#include "support/solids.h"
 
 namespace {
 
@@ -366,6 +367,98 @@ TEST(CylinderSearch, many_contacts_are_followed) {
     }
   }
   EXPECT_GE(most, 8);
+}
+
+// Outside, in closed form: the largest over directions of what the solid's support leaves to the wall.
+double gap_outside(const Solid& solid, const Particle& p, double radius, double* angle) {
+  const auto gap = [&](double t) {
+    const Vec3 d(std::cos(t), std::sin(t), 0);
+    return d.dot(p.x + support_of(solid, p, -d)) - radius;
+  };
+  double best = -HUGE_VAL;
+  for (int k = 0; k < kAround; ++k)
+    if (const double t = 2 * M_PI * k / kAround; gap(t) > best) best = gap(*angle = t);
+  double low = *angle - 2 * M_PI / kAround, high = *angle + 2 * M_PI / kAround;
+  while (high - low > 1e-12) {
+    const double x = low + 0.382 * (high - low), y = high - 0.382 * (high - low);
+    (gap(x) > gap(y) ? high : low) = gap(x) > gap(y) ? y : x;
+  }
+  return gap(*angle = 0.5 * (low + high));
+}
+
+// Corners and tips are supports along many directions: the wall's normal is the one that points at them.
+TEST(CylinderSearch, corners_and_tips_outside_touch_where_they_are_nearest) {
+  Random random(14);
+  const Vec3 half(1, 0.8, 0.6);
+  std::vector<Solid> solids(1);
+  solids[0].shape = make_shape("box", box(half));
+  solids[0].support = [half](const Vec3& d) { return box_support(d, half, 0); };
+  for (int k = 0; k < 3; ++k) {
+    solids.push_back(cone(random, random.uniform(0.3, 1), random.uniform(0.5, 2)));
+    solids.push_back(double_cone(random, 1, 0.5, 0.5));
+    solids.push_back(polyhedron(random, 6, 1));
+  }
+  int touching = 0, apart = 0;
+  for (int n = 0; n < 400; ++n) {
+    const Solid& solid = solids[n % solids.size()];
+    const double size = solid.shape->bounding_radius, radius = size * random.log_uniform(0.3, 30),
+                 wanted = size * random.log_uniform(1e-5, 1e-3) * (n % 4 == 0 ? 1 : -1);
+    Particle p{solid.shape.get(), 1, Vec3(2 * radius + 3 * size, 0, random.uniform(-5, 5)), random.turn()};
+    double angle = 0, gap = gap_outside(solid, p, radius, &angle);
+    for (int k = 0; k < 50 && std::abs(gap - wanted) > 1e-8 * size; ++k) {
+      p.x += (wanted - gap) * Vec3(std::cos(angle), std::sin(angle), 0);
+      gap = gap_outside(solid, p, radius, &angle);
+    }
+    SCOPED_TRACE(solid.shape->name + " " + std::to_string(n));
+    const SurfaceContacts found = find_from_scratch(p, Vec3::Zero(), Vec3::UnitZ(), radius);
+    ASSERT_EQ(found.count, gap < 0 ? 1 : 0);
+    if (gap < 0) {
+      ++touching;
+      EXPECT_NEAR(found.contact[0].gap, gap, 1e-10 * size);
+    } else {
+      ++apart;
+    }
+  }
+  EXPECT_GT(touching, 200);
+  EXPECT_GT(apart, 50);
+}
+
+// A survey that outlives its contacts does not hide them when the body comes back to where it was.
+TEST(CylinderSearch, contacts_in_a_tube_are_met_again_where_they_were_left) {
+  Random random(15);
+  const ShapePointer shapes[] = {make_shape("tablet", rounded_cylinder(1, 0.4, 0.15)),
+                                 make_shape("rounded box", rounded_box(Vec3(1, 0.8, 0.6), 0.1)), cuboid(),
+                                 cone(random, 1, 1).shape, polyhedron(random, 6, 1).shape};
+  int met = 0;
+  for (int n = 0; n < 300; ++n) {
+    const Shape& shape = *shapes[n % 5];
+    const double size = shape.bounding_radius, radius = size * random.log_uniform(1.1, 8);
+    Particle p{&shape, 1, Vec3(radius - 1.1 * size, 0, 0), random.turn()};
+    while (find_from_scratch(p, Vec3::Zero(), Vec3::UnitZ(), radius).count == 0) p.x[0] += 0.01 * size;
+    TubeSurvey survey;
+    const auto find = [&](double path, const SurfaceContacts& last) {
+      std::vector<FormerContact> former;
+      for (int k = 0; k < last.count; ++k) {
+        FormerContact f{};
+        f.normal = last.contact[k].normal;
+        f.memory = &last.contact[k].memory;
+        former.push_back(f);
+      }
+      SurfaceContacts found;
+      find_cylinder_contacts(p, Vec3::Zero(), Vec3::UnitZ(), radius, {}, path, former.data(),
+                             static_cast<int>(former.size()), &survey, &found);
+      return found;
+    };
+    const SurfaceContacts first = find(0, SurfaceContacts{});
+    p.x[0] -= 0.3 * size;
+    const SurfaceContacts away = find(0.3 * size, first);
+    if (away.count > 0) continue;
+    p.x[0] += 0.3 * size;
+    SCOPED_TRACE(shape.name + " " + std::to_string(n));
+    EXPECT_EQ(find(0.6 * size, away).count, first.count);
+    ++met;
+  }
+  EXPECT_GT(met, 200);
 }
 
 }  // namespace

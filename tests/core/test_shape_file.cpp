@@ -11,6 +11,7 @@
 #include "io/shape_file.h"
 #include "shapes/primitives.h"
 #include "support/random.h"
+#include "support/solids.h"
 
 namespace nurbs {
 namespace {
@@ -121,6 +122,14 @@ TEST(ShapeFile, WeightsAreOptionalAndPointsCartesian) {
   const ShapeFileContent weighted = parse_shape(root.dump(), "stone.json");
   EXPECT_EQ(weighted.surfaces[0].points[3], Vec4(2, 4, 6, 2));
   EXPECT_TRUE(weighted.warnings.empty());
+}
+
+TEST(ShapeFile, DecimalsAreCounted) {
+  std::vector<NurbsSurface> surfaces = exact_ellipsoid({1, 0.8, 0.6});
+  EXPECT_EQ(few_decimals(surfaces), 0);
+  for (const int digits : {3, 7, 10}) EXPECT_EQ(few_decimals(test::with_decimals(surfaces, digits)), digits);
+  EXPECT_EQ(few_decimals(test::with_decimals(surfaces, 11)), 0);
+  EXPECT_EQ(few_decimals(box({1.5, 2, 3})), 2);
 }
 
 TEST(ShapeFile, NameIsTheStemAndTheBodyIsBuilt) {

@@ -196,6 +196,13 @@ class NurbsShape(unittest.TestCase):
             self.assertEqual(call("make", *kind, "-o", str(self.file)).returncode, 0)
             self.assertIn(words, call("check", str(self.file)).stdout)
 
+    def test_dents_are_blamed_on_few_decimals(self):
+        pill = pathlib.Path(__file__).resolve().parents[1] / "cases" / "shape-pill-of-7-decimals.json"
+        for command in ("check", "info"):
+            self.assertIn("the dents are what its 7 decimals leave", call(command, str(pill)).stdout)
+        self.assertEqual(call("make", "capsule", "--radius", "1", "--length", "2", "-o", str(self.file)).returncode, 0)
+        self.assertNotIn("decimals leave", call("check", str(self.file)).stdout)
+
     def test_unusable_files(self):
         self.assert_one_error(call("check", str(self.place / "none.json")), "none.json")
         self.file.write_text("{")

@@ -83,6 +83,8 @@ class LineSearch {
   static bool same(const FeatureGap& p, const FeatureGap& q) {
     return (p.on_body - q.on_body).squaredNorm() == 0;
   }
+  // Of a corner, whatever parameters its supports have.
+  bool is_one_point(const Vec3& chord) const { return chord.norm() <= kRoundoff * 8 * size(); }
 
   Turned look(double angle) {
     Turned t;
@@ -92,20 +94,28 @@ class LineSearch {
     t.at.gap -= radius_;
     start_ = t.at.where;
     started_ = true;
-    t.slope = turned_at(angle).dot(particle_.x - a_ + t.at.on_body);
+    t.slope = slope_at(angle, t.at);
     return t;
   }
-  // The way of d when the angle grows.
-  Vec3 turned_at(double angle) const { return std::cos(angle) * side_ - std::sin(angle) * low_; }
+  // That f would have there, were this the support.
+  double slope_at(double angle, const FeatureGap& at) const {
+    const Vec3 turned = std::cos(angle) * side_ - std::sin(angle) * low_;
+    return turned.dot(particle_.x - a_ + at.on_body);
+  }
 
-  // The chord between the two supports has the normal that both share where f has a kink; a secant of the
-  // slopes leads to a smooth maximum.
+  // A corner at both ends is the support between them too, and d points at it where f is highest. The chord
+  // between two supports has the normal that both share where f has a kink; a secant of the slopes leads to a
+  // smooth maximum.
   double next_angle(int k, const Turned& low, const Turned& high, double weight_low,
                     double weight_high) const {
     const double width = high.angle - low.angle;
     double t = 0.5;
-    if (k % 3 == 1) {
-      const Vec3 chord = high.at.on_body - low.at.on_body;
+    const Vec3 chord = high.at.on_body - low.at.on_body;
+    if (is_one_point(chord)) {
+      const Vec3 y = particle_.x - a_ + low.at.on_body;
+      const double angle = std::atan2(side_.dot(y), low_.dot(y));
+      if (angle > low.angle && angle < high.angle) return angle;
+    } else if (k % 3 == 1) {
       const double along_low = chord.dot(low.d), along_high = chord.dot(high.d);
       // d = cos low + sin side with d . chord = 0, between the two.
       if (along_low * along_high < 0) {
@@ -122,11 +132,16 @@ class LineSearch {
     return low.angle + width * std::clamp(t, 1e-6, 1 - 1e-6);
   }
 
-  // Whether both supports lie in one straight part of the body's outline: the direction is its normal.
+  // Whether both supports lie in one straight part of the body's outline, with the line's point between them:
+  // the direction is its normal.
   bool across(const Turned& low, const Turned& high) const {
     const Vec3 chord = high.at.on_body - low.at.on_body;
-    return std::abs(chord.dot(low.d)) <= kRoundoff * 8 * size() ||
-           std::abs(chord.dot(high.d)) <= kRoundoff * 8 * size();
+    if (is_one_point(chord)) return false;
+    const auto is_normal = [&](const Turned& t) {
+      return std::abs(chord.dot(t.d)) <= kRoundoff * 8 * size() && slope_at(t.angle, low.at) >= 0 &&
+             slope_at(t.angle, high.at) <= 0;
+    };
+    return is_normal(low) || is_normal(high);
   }
 
   // Between the two supports lies the point over the line.
@@ -134,9 +149,7 @@ class LineSearch {
     const Turned& best = low.at.gap > high.at.gap ? low : high;
     FeatureContact c = contact(best.at, best.d);
     // Their own slopes are those of their own directions, which a kink found early leaves apart.
-    const Vec3 turned = turned_at(best.angle);
-    const double to_low = turned.dot(particle_.x - a_ + low.at.on_body),
-                 to_high = turned.dot(particle_.x - a_ + high.at.on_body);
+    const double to_low = slope_at(best.angle, low.at), to_high = slope_at(best.angle, high.at);
     if (to_low > 0 && to_high < 0)
       c.on_body = low.at.on_body + to_low / (to_low - to_high) * (high.at.on_body - low.at.on_body);
     c.along = direction_.dot(particle_.x - a_ + c.on_body);

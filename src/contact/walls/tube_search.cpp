@@ -261,12 +261,16 @@ class TubeSearch {
       *clear = std::min(*clear, gap);
     }
     known_count_ = former_count;
-    if (open && still) *clear = std::min(*clear, survey.still - stirred);
+    if (open && still) {  // as many as then, or some are met again that were left since
+      if (elsewhere != survey.open_count) return false;
+      *clear = std::min(*clear, survey.still - stirred);
+    }
     if (still || survey.opens == 0) return true;
     still_ = still_room();
     if (!find_in_open(survey, elsewhere, clear)) return false;
     survey.still_pose = {pose_.axis, pose_.apart, particle_.q};
     survey.still = still_;
+    survey.open_count = contacts_outside_arcs(survey);
     return true;
   }
 
@@ -513,6 +517,7 @@ class TubeSearch {
     survey->stamp = stamp(particle_);
     survey->radius = pose_.radius;
     survey->pose = survey->still_pose = {pose_.axis, pose_.apart, particle_.q};
+    survey->open_count = contacts_outside_arcs(*survey);
   }
 
   // No value of F has changed by more since a pose. (Of a turned axis, directions square to it turn by as
@@ -523,10 +528,19 @@ class TubeSearch {
            (pose_.axis - s.axis).norm() * (size_ + pose_.apart.norm());
   }
 
-  static TubeSurvey::Arc* arc_of(TubeSurvey& survey, const Known& k) {
+  static int arc_of(const TubeSurvey& survey, const Vec3& normal) {
     for (int i = 0; i < survey.count; ++i)
-      if (-k.contact.normal.dot(survey.arc[i].middle) >= survey.arc[i].half) return &survey.arc[i];
-    return nullptr;
+      if (-normal.dot(survey.arc[i].middle) >= survey.arc[i].half) return i;
+    return -1;
+  }
+  static TubeSurvey::Arc* arc_of(TubeSurvey& survey, const Known& k) {
+    const int i = arc_of(survey, k.contact.normal);
+    return i < 0 ? nullptr : &survey.arc[i];
+  }
+  int contacts_outside_arcs(const TubeSurvey& survey) const {
+    int count = 0;
+    for (int k = 0; k < out_.count; ++k) count += arc_of(survey, out_.contact[k].normal) < 0;
+    return count;
   }
 
   static constexpr int kMost = Workspace::kMost, kMostAngles = 64;

@@ -41,7 +41,8 @@ struct TubeSurvey {
   double radius = 0;
   Pose pose, still_pose;
   int count = 0, opens = 0;
-  bool wide = false;  // something else is open: nothing holds beyond `still`
+  bool wide = false;   // something else is open: nothing holds beyond `still`
+  int open_count = 0;  // contacts at `still_pose` that lie in none of the arcs
   Arc arc[kMostArcs];
   Open open[kMostOpen];
 };
