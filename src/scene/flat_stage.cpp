@@ -177,6 +177,7 @@ bool ContactStages::make_flat(ContactBlock& block, int lane, const Results& sing
   const ContactState none{};
   block.set(lane, kStateField, kContactStateSize, &none);
   block.field[kWeight][lane] = 1;
+  counts_.value[ContactCounts::contacts] -= share(a, b) * single.touching[lane];  // its points count
   run_flat(block, lane, flat, state);
   return true;
 }

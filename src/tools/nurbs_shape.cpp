@@ -544,6 +544,9 @@ void make_pebbles(const Options& options) {
   std::string stem = options.output();
   if (stem.size() > 5 && stem.substr(stem.size() - 5) == ".json") stem.resize(stem.size() - 5);
   const std::string name = std::filesystem::path(stem).filename().string();
+  if (name.find_first_of(" \t\n$#&*\"'") != std::string::npos)
+    throw UsageError("make pebbles: -o " + stem +
+                     ": a deck can't name such files; no blanks, quotes nor any of $ # & *");
   std::string id = name;  // of fixes: the host takes letters, digits and underscores
   for (char& c : id)
     if (!std::isalnum(static_cast<unsigned char>(c))) c = '_';

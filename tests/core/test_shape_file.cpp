@@ -129,7 +129,7 @@ TEST(ShapeFile, DecimalsAreCounted) {
   EXPECT_EQ(few_decimals(surfaces), 0);
   for (const int digits : {3, 7, 10}) EXPECT_EQ(few_decimals(test::with_decimals(surfaces, digits)), digits);
   EXPECT_EQ(few_decimals(test::with_decimals(surfaces, 11)), 0);
-  EXPECT_EQ(few_decimals(box({1.5, 2, 3})), 2);
+  EXPECT_EQ(few_decimals(box({1.5, 2, 3})), 1);
 }
 
 TEST(ShapeFile, NameIsTheStemAndTheBodyIsBuilt) {

@@ -123,6 +123,10 @@ class Rest(unittest.TestCase):
                 self.assertLess(left, 1e-12)
                 self.assertEqual(r.thermo["st[8]"][-1], 2)
 
+    def test_a_face_that_comes_down_counts_as_its_points(self):
+        r = run([atom(1, (0, 0, HALF[2] + 1e-4))], 200, every=1)
+        self.assertEqual(set(r.thermo["st[8]"]), {0, 4})
+
     def test_a_dropped_box_lies_still(self):
         for axis, angle in (((1, 0, 0), 0), ((1, 2, 0), 3), ((3, 1, 1), 25)):
             r = run([atom(1, (0, 0, HALF[2] + 0.25), turned(axis, angle))], 80000)

@@ -250,6 +250,11 @@ class NurbsShape(unittest.TestCase):
             run = call("make", "pebbles", "--count", "2", *words, "-o", str(self.file))
             self.assertIn(said, run.stdout)
 
+    def test_pebbles_that_a_deck_cannot_name(self):
+        for name in ("sp ace", "a$b", "c#d"):
+            self.assert_one_error(call("make", "pebbles", "--count", "2", "-o", str(self.place / name)), name)
+            self.assertEqual(list(self.place.glob(name + "*")), [])
+
     def test_examples_of_help_work_as_written(self):
         import meshes
         points, faces = meshes.grain(1, 3, rough=0.25)
