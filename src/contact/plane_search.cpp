@@ -16,6 +16,7 @@ namespace {
 // A support point with the surface around it, shape frame, scale 1.
 struct WarmSupport {
   Support support;
+  double attained;    // height along d of the surface point there: what the support's has moved on from
   SurfacePoint base;  // the parameters evaluated last
   JetLanes jet;       // the surface there
 };
@@ -42,7 +43,7 @@ bool solve_warm(const Shape& shape, const Vec3& d, SurfacePoint at, double toler
     const double excess =
         support_excess(shape, 1, radii_at(shape, at, nullptr, n), d, n, pole_noise(shape, std::min(lu, lv)));
     const double roundoff = kRoundoff * shape.bounding_radius;
-    if (excess <= tolerance &&
+    if (excess + roundoff <= tolerance &&
         (d - n).squaredNorm() * shape.bounding_radius <= std::max(tolerance, roundoff) &&
         turns_linearly(j, du, dv)) {
       Support& s = out->support;
@@ -50,6 +51,7 @@ bool solve_warm(const Shape& shape, const Vec3& d, SurfacePoint at, double toler
       s.where = next;
       s.point = taylor(j, du, dv);
       s.h = d.dot(s.point);
+      out->attained = std::min(f[0], s.h);
       s.upper = f[0] + excess + roundoff;
       s.iterations = k;
       s.converged = s.h >= f[0] - roundoff && s.h <= s.upper;
@@ -137,7 +139,7 @@ class PlaneLadder {
     if (!solve_warm(shape_, d_, start, settings_.tolerance * shape_.bounding_radius, &s)) return false;
     r->rung = Rung::warm;
     const double turned2_before = turned2(particle_.q, memory_.proof.q_b);
-    finish(s.support, r);
+    finish(s.support, s.attained, r);
     if (r->status == Status::converged) remember_model(s, turned2_before, r->gap);
     return true;
   }
@@ -148,13 +150,15 @@ class PlaneLadder {
     const SurfacePoint start = surface_point(memory_.on_b);
     r->rung = warm ? Rung::warm : Rung::cold;
     const double enough = kSupportShare * settings_.tolerance * shape_.bounding_radius;
-    finish(find_hull_support(shape_, d_, warm ? &start : nullptr, enough), r);
+    const Support s = find_hull_support(shape_, d_, warm ? &start : nullptr, enough);
+    finish(s, s.h, r);
   }
 
-  void finish(const Support& s, ContactResult* r) {
+  // `attained`: height of a point of the surface, which the support is not below.
+  void finish(const Support& s, double attained, ContactResult* r) {
     r->iterations = s.iterations;
     const double scale = particle_.scale;
-    set_contact(scale * s.h, scale * s.h, scale * s.upper, axes_ * (scale * s.point), r);
+    set_contact(scale * s.h, scale * attained, scale * s.upper, axes_ * (scale * s.point), r);
     remember_pose(r->lower);
     remember_point(s.where, &memory_.on_b);
   }

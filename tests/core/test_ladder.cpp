@@ -5,6 +5,7 @@
 #include <array>
 #include <map>
 
+#include "body/support.h"
 #include "contact/pair_search.h"
 #include "support/allocations.h"
 #include "support/bodies.h"
@@ -201,6 +202,31 @@ TEST(Plane, gap_of_an_ellipsoid_is_the_closed_form) {
       p.q = random.turn_by(1e-4) * p.q;
     }
   }
+}
+
+// A loose solve moves its point on to second order: that may lie beside the surface, and bounds nothing.
+TEST(Plane, loose_brackets_hold_the_gap) {
+  Random random(28);
+  ContactSettings settings;
+  settings.tolerance = 1e-4;
+  const ShapePointer shapes[] = {kinked(), smooth_pebble(), polar(), disc()};
+  int warm = 0;
+  for (int k = 0; k < 2000; ++k) {
+    Particle p{shapes[k % 4].get(), random.uniform(0.5, 2), random.direction(), random.turn()};
+    const Vec3 n = random.direction(), origin = p.x - random.uniform(0.5, 1.5) * n;
+    const double turn = random.log_uniform(1e-3, 0.1), allowed = 1e-14 * p.scale;
+    Memory memory{};
+    for (int step = 0; step < 4; ++step) {
+      const ContactResult r = find_plane_contact(p, origin, n, settings, memory.data());
+      const double gap =
+          n.dot(p.x - origin) - p.scale * find_hull_support(*p.shape, p.q.conjugate() * -n).h;
+      ASSERT_LE(r.lower, gap + allowed);
+      ASSERT_GE(r.upper, gap - allowed);
+      warm += r.rung == Rung::warm;
+      p.q = random.turn_by(turn) * p.q;
+    }
+  }
+  EXPECT_GT(warm, 500);
 }
 
 }  // namespace
