@@ -272,7 +272,7 @@ std::shared_ptr<const Shape> read_shape_file(const std::string& file, std::vecto
     throw ShapeError(with_file(error.what()));
   }
   if (warnings) {
-    for (const std::string& w : content.warnings) warnings->push_back(file + ": " + w);
+    for (const std::string& w : content.warnings) warnings->push_back(std::string(file).append(": ").append(w));
     for (const std::string& w : found) warnings->push_back(with_file(w));
   }
   return shape;

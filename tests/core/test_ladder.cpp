@@ -218,8 +218,7 @@ TEST(Plane, loose_brackets_hold_the_gap) {
     Memory memory{};
     for (int step = 0; step < 4; ++step) {
       const ContactResult r = find_plane_contact(p, origin, n, settings, memory.data());
-      const double gap =
-          n.dot(p.x - origin) - p.scale * find_hull_support(*p.shape, p.q.conjugate() * -n).h;
+      const double gap = n.dot(p.x - origin) - p.scale * find_hull_support(*p.shape, p.q.conjugate() * -n).h;
       ASSERT_LE(r.lower, gap + allowed);
       ASSERT_GE(r.upper, gap - allowed);
       warm += r.rung == Rung::warm;
