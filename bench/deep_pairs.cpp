@@ -26,8 +26,8 @@ using test::SurfaceCloud;
 constexpr int kDirections = 1500;   // 0.09 rad apart
 constexpr double kNeighbour = 0.2;  // rad: a direction lower than all this near is a local minimum
 constexpr int kCircle = 360;        // directions on a great circle
-constexpr int kTurns = 4;  // of the compass at one stride: p has creases where a body has corners or edges
-constexpr int kRounds = 3;
+constexpr int kTurns = 4;   // of the compass at one stride: p has creases where a body has corners or edges
+constexpr int kRounds = 3;  // of all pairs, timed
 constexpr double kWrong = 1e-8;  // of the smaller bounding radius; the solver is asked for 1e-9
 
 const std::vector<Vec3>& directions() {
@@ -66,11 +66,12 @@ struct Placed {
            d.dot(b.x - a.x);
   }
   // h_A(d) + h_B(-d) at directions().
-  void scan(std::vector<double>& coarse_at) const {
-    coarse_at.resize(kDirections);
+  std::vector<double> scan() const {
+    std::vector<double> h(kDirections);
     for (int n = 0; n < kDirections; ++n)
-      coarse_at[n] = a.scale * cloud_a.coarse(a.q.conjugate() * directions()[n]) +
-                     b.scale * cloud_b.coarse(b.q.conjugate() * -directions()[n]);
+      h[n] = a.scale * cloud_a.coarse(a.q.conjugate() * directions()[n]) +
+             b.scale * cloud_b.coarse(b.q.conjugate() * -directions()[n]);
+    return h;
   }
 };
 
@@ -221,13 +222,11 @@ void place(Placed& pair, const std::vector<double>& coarse, bench::Random& rando
   pair.b.x = std::max(0.0, distance) * line;
 }
 
-void draw(const bench::Body& a, const bench::Body& b, Placed& pair, std::vector<double>& coarse,
-          bench::Random& random) {
+void draw(const bench::Body& a, const bench::Body& b, Placed& pair, bench::Random& random) {
   pair.a = {a.shape.get(), 1, Vec3::Zero(), random.turn()};
   pair.b = {b.shape.get(), std::exp(random.uniform(std::log(0.3), std::log(3.0))), Vec3::Zero(),
             random.turn()};
-  pair.scan(coarse);
-  place(pair, coarse, random);
+  place(pair, pair.scan(), random);
 }
 
 int main_program(int argc, char** argv) {
@@ -249,14 +248,13 @@ int main_program(int argc, char** argv) {
   for (int i = 0; i < count; ++i)
     for (int j = i; j < count; ++j) combinations.emplace_back(i, j);
   // Timed in turn, as a run meets them, before anything is judged.
-  std::vector<double> coarse;
   std::vector<Placed> placed;
   std::vector<bench::Random> randoms;
   for (long k = 0; k < pairs; ++k) {
     const auto [i, j] = combinations[k % combinations.size()];
     randoms.emplace_back(static_cast<unsigned>(k + 1));
     placed.push_back({clouds[i], clouds[j], {}, {}});
-    draw(all[i], all[j], placed.back(), coarse, randoms.back());
+    draw(all[i], all[j], placed.back(), randoms.back());
   }
   std::vector<double> microseconds(pairs, 1e300);
   std::vector<ContactResult> results(pairs);
@@ -276,8 +274,7 @@ int main_program(int argc, char** argv) {
     const ContactResult& r = results[k];
     const double size =
         std::min(pair.a.scale * pair.a.shape->bounding_radius, pair.b.scale * pair.b.shape->bounding_radius);
-    pair.scan(coarse);
-    const std::vector<Minimum> minima = brute_force(pair, coarse, randoms[k]);
+    const std::vector<Minimum> minima = brute_force(pair, pair.scan(), randoms[k]);
     Row& row = rows[{i, j}];
     row.microseconds.push_back(microseconds[k]);
     ++row.pairs;

@@ -76,11 +76,15 @@ void require_count(size_t found, size_t expected, const char* what, const std::s
              " = " + std::to_string(expected));
 }
 
+bool has_weights(const Json& net) {
+  return net.contains("weights") && !net["weights"].is_null();
+}
+
 std::vector<Vec4> parse_points(const Json& net, size_t expected, const Place& place) {
   const Json& points = array(net, "points", place);
   require_count(points.size(), expected, "points", "size_u * size_v", place);
   std::vector<double> weights(expected, 1.0);
-  if (net.contains("weights") && !net["weights"].is_null()) {
+  if (has_weights(net)) {
     weights = numbers(net, "weights", place);
     require_count(weights.size(), expected, "weights", "size_u * size_v", place);
   }
@@ -122,9 +126,7 @@ NurbsSurface parse_surface(const Json& data, const Place& place) {
 
 // Says that it is rational, and not how.
 bool has_lost_weights(const Json& data) {
-  if (!data.contains("rational") || data["rational"] != true) return false;
-  const Json& net = data["control_points"];
-  return !net.contains("weights") || net["weights"].is_null();
+  return data.contains("rational") && data["rational"] == true && !has_weights(data["control_points"]);
 }
 
 Mat3 parse_gyration(const Json& root, const Place& place) {
@@ -272,7 +274,8 @@ std::shared_ptr<const Shape> read_shape_file(const std::string& file, std::vecto
     throw ShapeError(with_file(error.what()));
   }
   if (warnings) {
-    for (const std::string& w : content.warnings) warnings->push_back(std::string(file).append(": ").append(w));
+    for (const std::string& w : content.warnings)
+      warnings->push_back(std::string(file).append(": ").append(w));
     for (const std::string& w : found) warnings->push_back(with_file(w));
   }
   return shape;

@@ -723,14 +723,16 @@ void print_form(const Shape& shape) {
               static_cast<double>(memory(shape)) / 1024);
 }
 
-// Where the dents are what rounding the control points left; "" elsewhere.
-std::string blame_on_decimals(const Shape& shape) {
+// Where the dents are what rounding the control points left.
+void print_decimals(const Shape& shape, const char* label) {
   const int decimals = few_decimals(shape.surfaces);
   if (decimals == 0 || !(shape.concavity > kNoDent * shape.bounding_radius) ||
       shape.concavity > std::pow(10.0, -decimals))
-    return "";
-  return "the dents are what its " + std::to_string(decimals) +
-         " decimals leave; with 11 or more straight sides are straight, and contacts along them cheaper";
+    return;
+  std::printf(
+      "%sthe dents are what its %d decimals leave; with 11 or more straight sides are straight, and contacts "
+      "along them cheaper\n",
+      label, decimals);
 }
 
 void info(const std::string& file) {
@@ -743,8 +745,7 @@ void info(const std::string& file) {
   print_form(*shape);
   print_descriptors(*shape);
   print_cost(*shape);
-  const std::string blame = blame_on_decimals(*shape);
-  if (!blame.empty()) std::printf("digits             %s\n", blame.c_str());
+  print_decimals(*shape, "digits             ");
 }
 
 void check(const std::string& file) {
@@ -756,8 +757,7 @@ void check(const std::string& file) {
               file.c_str(), warnings.empty() ? ", convex" : "", shape->surfaces.size(),
               std::max(kinks.opening, kinks.closing), shape->concavity);
   for (const std::string& line : describe_proofs(*shape)) std::printf("  %s\n", line.c_str());
-  const std::string blame = blame_on_decimals(*shape);
-  if (!blame.empty()) std::printf("  %s\n", blame.c_str());
+  print_decimals(*shape, "  ");
 }
 
 // Sub-command `make`, with one of its own for every kind of body.

@@ -69,7 +69,7 @@ class LineSearch {
         raised_ = -1;
       }
       if (kink && across(low, high)) break;
-      if (moved < kLineAngle && std::abs(next.slope) <= kRoundoff * 8 * size()) break;
+      if (moved < kLineAngle && std::abs(next.slope) <= noise()) break;
     }
     return finish(low, high);
   }
@@ -79,12 +79,13 @@ class LineSearch {
   static constexpr double kLineAngle = 1e-12;  // rad, of the bracket
   static constexpr int kLineSearches = 60;
 
-  double size() const { return particle_.scale * particle_.shape->bounding_radius; }
+  // Round-off of the body's points.
+  double noise() const { return kRoundoff * 8 * particle_.scale * particle_.shape->bounding_radius; }
   static bool same(const FeatureGap& p, const FeatureGap& q) {
     return (p.on_body - q.on_body).squaredNorm() == 0;
   }
   // Of a corner, whatever parameters its supports have.
-  bool is_one_point(const Vec3& chord) const { return chord.norm() <= kRoundoff * 8 * size(); }
+  bool is_one_point(const Vec3& chord) const { return chord.norm() <= noise(); }
 
   Turned look(double angle) {
     Turned t;
@@ -138,7 +139,7 @@ class LineSearch {
     const Vec3 chord = high.at.on_body - low.at.on_body;
     if (is_one_point(chord)) return false;
     const auto is_normal = [&](const Turned& t) {
-      return std::abs(chord.dot(t.d)) <= kRoundoff * 8 * size() && slope_at(t.angle, low.at) >= 0 &&
+      return std::abs(chord.dot(t.d)) <= noise() && slope_at(t.angle, low.at) >= 0 &&
              slope_at(t.angle, high.at) <= 0;
     };
     return is_normal(low) || is_normal(high);

@@ -232,7 +232,7 @@ class TubeSearch {
       if (!follow(*former[k].memory, &next)) return false;
       for (int j = 0; j < k; ++j)  // two that have become one
         if (std::abs(std::remainder(next.angle - known_[j].angle, 2 * M_PI)) < kFinestRing) return false;
-      TubeSurvey::Arc* arc = arc_of(survey, next);
+      TubeSurvey::Arc* arc = arc_of(survey, next.contact.normal);
       if (arc == nullptr && open) {
         ++elsewhere;
         if (!still) continue;
@@ -254,7 +254,8 @@ class TubeSearch {
       double gap = arc.clear - moved;
       if (!(gap > 0)) {  // one that now touches is found as from scratch
         Known next;
-        if (!follow(arc.memory, &next) || arc_of(survey, next) != &arc || next.contact.gap < 0) return false;
+        if (!follow(arc.memory, &next) || arc_of(survey, next.contact.normal) != &arc || next.contact.gap < 0)
+          return false;
         arc.memory = next.memory;
         gap = next.contact.gap;
       }
@@ -528,18 +529,15 @@ class TubeSearch {
            (pose_.axis - s.axis).norm() * (size_ + pose_.apart.norm());
   }
 
-  static int arc_of(const TubeSurvey& survey, const Vec3& normal) {
+  // That a contact with this normal lies in, or nullptr.
+  static TubeSurvey::Arc* arc_of(TubeSurvey& survey, const Vec3& normal) {
     for (int i = 0; i < survey.count; ++i)
-      if (-normal.dot(survey.arc[i].middle) >= survey.arc[i].half) return i;
-    return -1;
+      if (-normal.dot(survey.arc[i].middle) >= survey.arc[i].half) return &survey.arc[i];
+    return nullptr;
   }
-  static TubeSurvey::Arc* arc_of(TubeSurvey& survey, const Known& k) {
-    const int i = arc_of(survey, k.contact.normal);
-    return i < 0 ? nullptr : &survey.arc[i];
-  }
-  int contacts_outside_arcs(const TubeSurvey& survey) const {
+  int contacts_outside_arcs(TubeSurvey& survey) const {
     int count = 0;
-    for (int k = 0; k < out_.count; ++k) count += arc_of(survey, out_.contact[k].normal) < 0;
+    for (int k = 0; k < out_.count; ++k) count += arc_of(survey, out_.contact[k].normal) == nullptr;
     return count;
   }
 
