@@ -270,7 +270,7 @@ TEST(Fuzz, edges_vertices_and_cylinders) {
       const double radius = random.below(2) ? 0 : size * random.log_uniform(1e-3, 10);
       const FeatureContact line =
           find_line_contact(p, a, along, low, random.below(4) ? high : low, radius, &start);
-      const FeatureContact point = find_point_contact(p, a, random.direction(), &start);
+      const FeatureContact point = find_point_contact(p, a, random.direction(), {}, &start);
       for (const FeatureContact& c : {line, point}) {
         if (!c.touching) continue;
         ASSERT_TRUE(std::isfinite(c.gap) && std::isfinite(c.along)) << shape->name;

@@ -6,8 +6,12 @@
 
 #include "body/support.h"
 #include "contact/local_model.h"
+#include "contact/pair_memory.h"
+#include "contact/pair_search.h"
+#include "contact/sphere_search.h"
 #include "nurbs/jet_lanes.h"
 #include "nurbs/tolerances.h"
+#include "shapes/primitives.h"
 
 namespace nurbs {
 namespace {
@@ -40,6 +44,17 @@ class LineSearch {
     side_ = (high - low.dot(high) * low).normalized();
     span_ = std::atan2(low.cross(high).norm(), low.dot(high));
   }
+  LineSearch(const Particle& particle, const Vec3& a, const Vec3& direction, const Arc& arc,
+             const SurfacePoint* start)
+      : particle_(particle),
+        a_(a),
+        direction_(direction),
+        radius_(0),
+        low_(arc.low),
+        side_(arc.side),
+        span_(arc.span) {
+    if (start) start_ = *start, started_ = true;
+  }
 
   FeatureContact run() {
     Turned low = look(0);
@@ -49,6 +64,106 @@ class LineSearch {
     if (!(high.at.gap < 0)) return {};
     if (low.slope <= 0) return finish(low, low);
     if (high.slope >= 0) return finish(high, high);
+    return climb(low, high);
+  }
+
+  // The highest of all maxima; see find_highest_line_contact.
+  FeatureContact run_over_all(double* angle) {
+    FeatureContact c = find_highest(angle);
+    c.along_low = c.along_high = c.along;
+    if (!c.touching || particle_.shape->flats.empty()) return c;
+    // Lines of the body along this one: tilted, the ends of them.
+    const Vec3 across = c.normal.cross(direction_);
+    for (const double tilt : {kTilt, -kTilt}) {
+      const FeatureGap g = gap_along(particle_, a_, (c.normal + tilt * direction_).normalized(), &c.where);
+      const Vec3 y = particle_.x - a_ + g.on_body;
+      if (std::abs(across.dot(y)) > kTilt * kTilt * particle_.scale * particle_.shape->bounding_radius) continue;
+      const double along = direction_.dot(y);
+      c.along_low = std::min(c.along_low, along);
+      c.along_high = std::max(c.along_high, along);
+    }
+    return c;
+  }
+
+ private:
+  static constexpr double kStraight = 1e-13;   // rad: two normals are one
+  static constexpr double kLineAngle = 1e-12;  // rad, of the bracket
+  static constexpr double kNarrow = 0.1;       // rad: a bracket that has one maximum
+  static constexpr double kTilt = 1e-6;        // rad: lines less apart are along each other
+  static constexpr int kLineSearches = 60;
+  static constexpr int kArcCuts = 48;
+
+  FeatureContact find_highest(double* angle) {
+    Turned met[kArcCuts];
+    int count = 0, best = 0;
+    for (const double at : {0.0, 0.5 * span_, span_}) {
+      met[count] = look(at);
+      if (!(met[count++].at.gap < 0)) return {};
+    }
+    while (count < kArcCuts) {
+      for (int i = 0; i < count; ++i)
+        if (met[i].at.gap > met[best].at.gap) best = i;
+      const double level = met[best].at.gap + kLineLevel * std::abs(met[best].at.gap) + noise();
+      int top = -1, open = 0;
+      double most = level, cut = 0;
+      for (int i = 0; i + 1 < count; ++i) {
+        double where;
+        const double bound = bound_between(met[i], met[i + 1], &where);
+        if (!(bound > level)) continue;
+        ++open;
+        if (bound > most) most = bound, top = i, cut = where;
+      }
+      if (top < 0) break;
+      const Turned &low = met[top], &high = met[top + 1];
+      const double width = high.angle - low.angle;
+      if (width < kLineAngle) break;
+      if (open == 1 && width < kNarrow && low.slope > 0 && high.slope < 0) {
+        const FeatureContact c = climb(low, high);
+        *angle = 0.5 * (low.angle + high.angle);
+        return c;
+      }
+      const double margin = std::min(1e-3 * width, kLineAngle);
+      const Turned next = look(std::clamp(cut, low.angle + margin, high.angle - margin));
+      if (!(next.at.gap < 0)) return {};
+      for (int i = count++; i > top + 1; --i) met[i] = met[i - 1];
+      met[top + 1] = next;
+      best = 0;
+    }
+    for (int i = 0; i < count; ++i)
+      if (met[i].at.gap > met[best].at.gap) best = i;
+    *angle = met[best].angle;
+    // At a kink the next direction on the side to which f rises has the other support.
+    const bool up = best == 0 || (best + 1 < count && met[best].slope > 0);
+    const int other = up ? best + 1 : best - 1;
+    return up ? finish(met[best], met[other]) : finish(met[other], met[best]);
+  }
+
+  // f between two directions is at most what their supports would make of it, the lower of two sinusoids: that
+  // is highest at an end, where they meet, or where the lower one is.
+  double bound_between(const Turned& low, const Turned& high, double* where) const {
+    const auto sinusoid = [&](const Turned& t) {
+      const Vec3 y = particle_.x - a_ + t.at.on_body;
+      return Vec2(low_.dot(y), side_.dot(y));
+    };
+    const Vec2 l = sinusoid(low), h = sinusoid(high);
+    double most = -kFarAway;
+    const auto offer = [&](double angle) {
+      if (!(angle >= low.angle && angle <= high.angle)) return;
+      const Vec2 d(std::cos(angle), std::sin(angle));
+      const double value = std::min(d.dot(l), d.dot(h)) - radius_;
+      if (value > most) most = value, *where = angle;
+    };
+    offer(low.angle);
+    offer(high.angle);
+    for (const Vec2& y : {Vec2(h[1] - l[1], l[0] - h[0]), l, h}) {
+      const double angle = std::atan2(y[1], y[0]);
+      offer(angle);
+      offer(angle < 0 ? angle + M_PI : angle);
+    }
+    return most;
+  }
+
+  FeatureContact climb(Turned low, Turned high) {
     double weight_low = 1, weight_high = 1;  // of the slopes: Illinois
     for (int k = 0; k < kLineSearches; ++k) {
       const double width = high.angle - low.angle;
@@ -73,11 +188,6 @@ class LineSearch {
     }
     return finish(low, high);
   }
-
- private:
-  static constexpr double kStraight = 1e-13;   // rad: two normals are one
-  static constexpr double kLineAngle = 1e-12;  // rad, of the bracket
-  static constexpr int kLineSearches = 60;
 
   // Round-off of the body's points.
   double noise() const { return kRoundoff * 8 * particle_.scale * particle_.shape->bounding_radius; }
@@ -167,45 +277,76 @@ class LineSearch {
   int raised_ = 0;
 };
 
-// --- a point: the polytope of the support points met
+// --- a point
 
-constexpr int kPointCuts = 24;
 constexpr int kPointNewton = 8;
+constexpr double kBallShare = 0.25;  // of the bounding radius
 
-// max over unit d of min over i of d . p_i, from the active sets of one, two and three points.
-struct Cuts {
-  Vec3 p[kPointCuts];
-  int count = 0;
-
-  double least(const Vec3& d) const {
-    double value = d.dot(p[0]);
-    for (int i = 1; i < count; ++i) value = std::min(value, d.dot(p[i]));
-    return value;
-  }
-  // The normal to leave by: of the polytope's nearest face when the origin is inside, else the direction that
-  // proves it outside.
-  double best(Vec3* d) const {
-    double most = -kFarAway;
-    const auto offer = [&](const Vec3& v) {
-      const double norm = v.norm();
-      if (!(norm > 1e-300)) return;
-      for (const double sign : {1.0, -1.0}) {
-        const Vec3 u = sign / norm * v;
-        const double value = least(u);
-        if (value > most) most = value, *d = u;
-      }
-    };
-    for (int i = 0; i < count; ++i) {
-      offer(p[i]);
-      for (int j = i + 1; j < count; ++j) {
-        const Vec3 edge = p[j] - p[i];
-        offer(p[i] - p[i].dot(edge) / std::max(edge.squaredNorm(), 1e-300) * edge);
-        for (int k = j + 1; k < count; ++k) offer(edge.cross(p[k] - p[i]));
-      }
+// Newton to a normal of the body that goes through `a`, from a direction near it. False where it does not get
+// there: kinks, flats, ruled lines. Not touching as soon as a direction says so.
+bool find_foot(const Particle& particle, const Vec3& a, Vec3 d, const SurfacePoint* start,
+               FeatureContact* out) {
+  const Mat3 axes = particle.q.toRotationMatrix();
+  const double size = particle.scale * particle.shape->bounding_radius;
+  FeatureGap g = gap_along(particle, a, d, start);
+  const auto end = [&] {
+    *out = contact(g, d);
+    return true;
+  };
+  for (int k = 0; k < kPointNewton; ++k) {
+    if (!(g.gap < 0)) return end();
+    JetLanes jet;
+    evaluate2(particle.shape->patches[g.where.patch], g.where.u, g.where.v, &jet);
+    SupportModel model;
+    if (!make_support_model(axes, Vec3::Zero(), jet, LocalRate{0, 0, 0}, &model)) return false;
+    const Vec3 t = vec(model.tangent), n = vec(model.normal), s = n.cross(t);
+    if (!((n + d).norm() < 1e-4)) return false;  // a kink: the normal is not what was asked for
+    // (W - overlap) tau = (x - a) across d.
+    const Vec3 x = particle.x - a + g.on_body;
+    const double w0 = particle.scale * model.w0 + g.gap, w1 = particle.scale * model.w1,
+                 w2 = particle.scale * model.w2 + g.gap, det = w0 * w2 - w1 * w1;
+    if (!(w0 > 0 && det > 0)) return false;
+    const double rt = t.dot(x), rs = s.dot(x);
+    Vec3 tau = ((w2 * rt - w1 * rs) * t + (w0 * rs - w1 * rt) * s) / det;
+    tau -= d.dot(tau) * d;
+    const double step = tau.norm();
+    if (step < 1e-12) return end();
+    if (step > 0.5) tau *= 0.5 / step;
+    bool higher = false;
+    for (int half = 0; half < 4; ++half, tau *= 0.3) {
+      const Vec3 next = (d + tau).normalized();
+      const FeatureGap there = gap_along(particle, a, next, &g.where);
+      if (!(there.gap > g.gap - kRoundoff * size)) continue;
+      d = next;
+      g = there;
+      higher = true;
+      break;
     }
-    return most;
+    if (!higher) return false;
+    if (step < 1e-7) return end();  // the next step is its square
   }
-};
+  return false;
+}
+
+// The contact of a ball about `a`, less the ball's radius: as far as the shortest way out of the body goes, a
+// point and a ball are the same.
+FeatureContact find_way_out(const Particle& particle, const Vec3& a, const ContactSettings& settings) {
+  static const std::shared_ptr<const Shape> kBall = make_shape("ball", exact_ellipsoid(Vec3::Ones()));
+  Particle ball;
+  ball.shape = kBall.get();
+  ball.x = a;
+  ball.scale = kBallShare * particle.scale * particle.shape->bounding_radius;
+  PairMemory memory{};
+  const ContactResult r = find_contact(ball, particle, settings, reinterpret_cast<double*>(&memory));
+  FeatureContact c;
+  c.gap = r.gap + ball.scale * roundness(*kBall).radius;
+  c.touching = r.status != Status::separated && c.gap < 0;
+  if (!c.touching) return c;
+  c.normal = r.normal;
+  c.on_body = a - particle.x + c.gap * r.normal;
+  c.where = warm_point(memory.on_b, *particle.shape);
+  return c;
+}
 
 }  // namespace
 
@@ -225,76 +366,19 @@ FeatureContact find_line_contact(const Particle& particle, const Vec3& a, const 
   return LineSearch(particle, a, direction, low, high, radius, start).run();
 }
 
+FeatureContact find_highest_line_contact(const Particle& particle, const Vec3& a, const Vec3& direction,
+                                         const Arc& arc, const SurfacePoint* start, double* angle) {
+  return LineSearch(particle, a, direction, arc, start).run_over_all(angle);
+}
+
 FeatureContact find_point_contact(const Particle& particle, const Vec3& a, const Vec3& guess,
-                                  const SurfacePoint* start) {
-  const Shape& shape = *particle.shape;
-  const Mat3 axes = particle.q.toRotationMatrix();
-  const double size = particle.scale * shape.bounding_radius;
-  Cuts cuts;
-  const auto keep = [&](const FeatureGap& g) {
-    if (cuts.count < kPointCuts) cuts.p[cuts.count++] = particle.x - a + g.on_body;
-  };
-  Vec3 d = guess;
-  FeatureGap g = gap_along(particle, a, d, start);
-  keep(g);
-  for (int k = 0; k < kPointNewton && g.gap < 0; ++k) {
-    JetLanes jet;
-    evaluate2(shape.patches[g.where.patch], g.where.u, g.where.v, &jet);
-    SupportModel model;
-    if (!make_support_model(axes, Vec3::Zero(), jet, LocalRate{0, 0, 0}, &model)) break;
-    const Vec3 t = vec(model.tangent), n = vec(model.normal), s = n.cross(t);
-    if (!((n + d).norm() < 1e-4)) break;  // a kink: the normal is not what was asked for
-    // (W - overlap) tau = (x - a) across d.
-    const Vec3 x = particle.x - a + g.on_body;
-    const double w0 = particle.scale * model.w0 + g.gap, w1 = particle.scale * model.w1,
-                 w2 = particle.scale * model.w2 + g.gap, det = w0 * w2 - w1 * w1;
-    if (!(w0 > 0 && det > 0)) break;
-    const double rt = t.dot(x), rs = s.dot(x);
-    Vec3 tau = ((w2 * rt - w1 * rs) * t + (w0 * rs - w1 * rt) * s) / det;
-    tau -= d.dot(tau) * d;
-    const double step = tau.norm();
-    if (step < 1e-12) return contact(g, d);
-    if (step > 0.5) tau *= 0.5 / step;
-    bool higher = false;
-    for (int half = 0; half < 4; ++half, tau *= 0.3) {
-      const Vec3 next = (d + tau).normalized();
-      const FeatureGap there = gap_along(particle, a, next, &g.where);
-      keep(there);
-      if (!(there.gap > g.gap - kRoundoff * size)) continue;
-      d = next;
-      g = there;
-      higher = true;
-      break;
-    }
-    if (!higher) break;
-    if (step < 1e-7) return contact(g, d);  // the next step is its square
-  }
-  if (!(g.gap < 0)) return {};
-  // Kinks and flats.
-  FeatureGap best = g;
-  Vec3 best_d = d;
-  for (const Vec3& side : {d.unitOrthogonal(), Vec3(-d.unitOrthogonal()), Vec3(d.cross(d.unitOrthogonal())),
-                           Vec3(-d.cross(d.unitOrthogonal()))}) {
-    const Vec3 tilted = (d + 0.3 * side).normalized();
-    const FeatureGap there = gap_along(particle, a, tilted, &g.where);
-    if (!(there.gap < 0)) return {};
-    keep(there);
-    if (there.gap > best.gap) best = there, best_d = tilted;
-  }
-  for (int k = cuts.count; k < kPointCuts; ++k) {
-    Vec3 next;
-    const double most = cuts.best(&next);
-    if (most <= best.gap + 1e-12 * size) break;
-    const FeatureGap there = gap_along(particle, a, next, nullptr);
-    if (!(there.gap < 0)) return {};
-    keep(there);
-    if (there.gap > best.gap) best = there, best_d = next;
-    if (there.gap >= most - 1e-12 * size) break;
-  }
-  FeatureContact c = contact(best, best_d);
-  // The body's point under `a`: on a flat the support may be anywhere.
-  c.on_body = a - particle.x + best.gap * best_d;
-  return c;
+                                  const ContactSettings& settings, const SurfacePoint* start) {
+  // A ball of the least curvature radius rolls inside: from no deeper than that, a normal is the shortest way.
+  FeatureContact c;
+  if (find_foot(particle, a, guess, start, &c) &&
+      (!c.touching || -c.gap <= particle.scale * particle.shape->curvature.min_radius))
+    return c;
+  return find_way_out(particle, a, settings);
 }
 
 }  // namespace nurbs

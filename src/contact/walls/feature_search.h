@@ -8,9 +8,13 @@
 // clear of the whole feature and ends the search.
 #pragma once
 
+#include <cmath>
+
 #include "contact/contact.h"
 
 namespace nurbs {
+
+constexpr double kLineLevel = 1e-9;
 
 struct FeatureContact {
   bool touching = false;        // else nothing below means anything
@@ -18,6 +22,7 @@ struct FeatureContact {
   Vec3 normal = Vec3::Zero();   // unit d, lab
   Vec3 on_body = Vec3::Zero();  // the body's deepest point, relative to its centre of mass, lab axes
   double along = 0;             // place of it on the line, from `a`
+  double along_low = 0, along_high = 0;  // of all points as deep (find_highest_line_contact)
   SurfacePoint where;           // the body's surface point, to start from next time
 };
 
@@ -28,10 +33,25 @@ struct FeatureContact {
 FeatureContact find_line_contact(const Particle& particle, const Vec3& a, const Vec3& direction,
                                  const Vec3& low, const Vec3& high, double radius, const SurfacePoint* start);
 
-// A point `a`; `guess` is a unit direction near the answer. Newton by the body's curvature, 2 to 4 support
-// searches; where that fails (kinks, flats) the polytope of the support points met: at most kPointCuts.
+// The directions square to a line from `low` on towards `side`, both unit, square to each other and to the
+// line: d = cos(angle) low + sin(angle) side, 0 <= angle <= span <= pi.
+struct Arc {
+  Vec3 low, side;
+  double span = 0;
+  Vec3 end(int which) const { return which == 0 ? low : Vec3(std::cos(span) * low + std::sin(span) * side); }
+};
+// The highest maximum of f over the arc, whatever others there are: a body sharper than its overlap is deep
+// has several. Every support bounds f above by a sinusoid, two of them on the interval between; the highest
+// interval is cut where its two meet. `angle` receives the direction's, 0 or the span where f is highest at
+// an end. Maxima that differ by less than kLineLevel of the overlap are taken for one.
+FeatureContact find_highest_line_contact(const Particle& particle, const Vec3& a, const Vec3& direction,
+                                         const Arc& arc, const SurfacePoint* start, double* angle);
+
+// The shortest way out of the body for a point `a`, in any direction; `guess` is one near it. Newton by the
+// body's curvature, 2 to 4 support searches; where that fails (kinks, flats) or another way may be shorter
+// (deeper than the least curvature radius), the contact of the body with a ball about the point.
 FeatureContact find_point_contact(const Particle& particle, const Vec3& a, const Vec3& guess,
-                                  const SurfacePoint* start);
+                                  const ContactSettings& settings, const SurfacePoint* start);
 
 // f(d) along a unit direction, with the body's support point.
 struct FeatureGap {

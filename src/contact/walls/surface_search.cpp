@@ -25,11 +25,13 @@ struct ActivePlane {
   Vec3 deepest;          // the body's point, relative to its centre
   ContactResult result;
   PairMemory memory;
+  int contact = -1;  // of what was found
 };
 
 // An edge as the body meets it.
 struct MetEdge {
-  enum State { unknown, clear, along, before, beyond } state = unknown;  // beyond: past v[1]
+  enum State { unmet, unknown, clear, along, before, beyond } state = unmet;  // beyond: past v[1]
+  int contact = -1;
 };
 
 // From the point of an edge that is nearest to x.
@@ -38,11 +40,18 @@ Vec3 from_edge(const MeshPatch& patch, const MeshPatch::Edge& e, const Vec3& x) 
   return apart - std::clamp(apart.dot(e.direction), 0.0, e.length) * e.direction;
 }
 
+// An edge as a piece of a line.
+struct Stretch {
+  int edge;
+  double from, to;
+};
+
 // Room that is used again by every search of a thread.
 struct Workspace {
   std::vector<ActivePlane> planes;
   std::vector<MetEdge> edges;
   std::vector<int> active;
+  std::vector<Stretch> line;
 };
 Workspace& workspace() {
   static thread_local Workspace w;
@@ -84,14 +93,13 @@ class SurfaceSearch {
     if (edges_.size() < patch_.edges().size()) edges_.resize(patch_.edges().size());
     for (const int p : active) {
       const MeshPatch::Plane& plane = patch_.planes()[p];
-      for (int i = 0; i < plane.edges; ++i)
-        edges_[patch_.edge_in(plane.first_edge + i)].state = MetEdge::unknown;
+      for (int i = 0; i < plane.edges; ++i) edges_[patch_.edge_in(plane.first_edge + i)] = MetEdge{};
     }
     for (const int p : active) {
       const MeshPatch::Plane& plane = patch_.planes()[p];
       for (int i = 0; i < plane.edges; ++i) {
         const int e = patch_.edge_in(plane.first_edge + i);
-        if (first_plane_of(patch_.edges()[e]) == p) touch_edge(e);
+        if (edges_[e].state == MetEdge::unmet) touch_edge(e);
       }
     }
     for (const int p : active) {
@@ -101,6 +109,7 @@ class SurfaceSearch {
         if (first_plane_of(patch_.vertices()[v]) == p) touch_vertex(v);
       }
     }
+    leave_out_dropped();
     if (out_.count > 0) out_.expiry = -kFarAway;
   }
 
@@ -254,7 +263,8 @@ class SurfaceSearch {
   bool look_at_plane(int number) {
     MeshPatch::Plane& plane = patch_.planes()[number];
     ActivePlane& met = planes_[number];
-    met.active = met.stands = false;
+    met.active = met.stands = met.claimed = false;
+    met.contact = -1;
     if (path_ < plane.expiry) return false;
     const double height = plane.normal.dot(particle_.x - plane.origin);
     if (std::abs(height) > radius_) {
@@ -327,15 +337,62 @@ class SurfaceSearch {
     return -1;
   }
 
+  // Whether a point is above, or below, a cell of a plane.
+  bool is_over(int number, const Vec3& x) const {
+    const MeshPatch::Plane& plane = patch_.planes()[number];
+    for (int i = 0; i < plane.cells; ++i)
+      if (in_cell(patch_.cells()[patch_.cell_in(plane.first + i)], x)) return true;
+    return false;
+  }
+  bool in_cell(const MeshPatch::Cell& cell, const Vec3& x) const {
+    const Vec3& normal = patch_.planes()[cell.plane].normal;
+    for (int k = cell.first; k < cell.first + cell.corners; ++k) {
+      const MeshPatch::Edge& e = patch_.edges()[patch_.edge_of(k)];
+      const double s = normal.cross(e.direction).dot(x - patch_.vertices()[e.v[0]].x);
+      if (!(patch_.sign_of(k) * s > -kWithin * radius_)) return false;
+    }
+    return true;
+  }
+
   void touch_face(int number) {
     const ActivePlane& met = planes_[number];
     const int cell = patch_.unbounded() ? -1 : cell_below(number);
     if (!patch_.unbounded() && cell < 0) return;
+    if (!patch_.unbounded() && finds_sharp(met.result.gap) && passes_by_face(number)) return;
     add_plane(number, cell < 0 ? 0 : patch_.cells()[cell].triangle, false, met.result.gap, met.deepest);
   }
 
-  void add_plane(int number, int triangle, bool flat, double gap, const Vec3& on_body) {
+  // Whether a body's deepest point is above a face that the body does not meet, as it passes by its border.
+  // It has its centre and its deepest point and all between; beyond the side over which that line leaves the
+  // face there may be a direction that parts the two.
+  bool passes_by_face(int number) {
     const ActivePlane& met = planes_[number];
+    const MeshPatch::Plane& plane = patch_.planes()[number];
+    const double slope = met.normal.dot(-met.deepest);
+    if (!(slope > 0)) return false;
+    const Vec3 from = particle_.x + met.deepest - met.result.gap * met.normal;
+    const Vec3 to = particle_.x + met.deepest + met.result.gap / slope * met.deepest;  // where it crosses the plane
+    for (int i = 0; i < plane.edges; ++i) {
+      const MeshPatch::Edge& e = patch_.edges()[patch_.edge_in(plane.first_edge + i)];
+      const Vec3& a = patch_.vertices()[e.v[0]].x;
+      for (int k = 0; k < e.sides; ++k) {
+        if (plane_of(e, k) != number) continue;
+        const Vec3 inward = into(e, k);
+        const double start = inward.dot(from - a), end = inward.dot(to - a);
+        if (!(start >= 0 && end < 0)) continue;
+        const double along = e.direction.dot(from + start / (start - end) * (to - from) - a);
+        if (along < 0 || along > e.length) continue;
+        double angle;
+        return !find_highest_line_contact(particle_, a, e.direction, {met.normal, -inward, 0.5 * M_PI},
+                                          nullptr, &angle)
+                    .touching;
+      }
+    }
+    return false;
+  }
+
+  void add_plane(int number, int triangle, bool flat, double gap, const Vec3& on_body) {
+    ActivePlane& met = planes_[number];
     SurfaceContact c;
     c.flat = flat;
     c.gap = gap;
@@ -348,7 +405,331 @@ class SurfaceSearch {
     c.iterations = met.result.iterations;
     c.converged = met.result.status == Status::converged;
     c.memory = met.memory;
+    met.contact = add(c);
+  }
+
+  // Number of the contact, -1 where there is no more room.
+  int add(const SurfaceContact& c) {
+    if (out_.count < kSurfaceContacts) dropped_[out_.count] = false;
     out_.add(c);
+    return out_.full ? -1 : out_.count - 1;
+  }
+  void leave_out_dropped() {
+    int kept = 0;
+    for (int i = 0; i < out_.count; ++i) {
+      if (dropped_[i]) continue;
+      if (kept < i) out_.contact[kept] = out_.contact[i];
+      ++kept;
+    }
+    out_.count = kept;
+  }
+
+  // --- edges and vertices that stand out, against bodies sharper than their overlap with a plane is deep
+  //
+  // There the heights have several maxima, and a face may have the deepest point of a body that is behind its
+  // plane by all its size and over its border by next to nothing. The wall about a convex edge or vertex is a
+  // wedge or a cone, and the way out of it is the shortest along any normal that it has there. A contact with
+  // a piece of it that is deeper than that is none.
+
+  // Whether a body is too sharp for its overlap with the planes to have one maximum over directions.
+  bool finds_sharp(double gap) const {
+    const Shape& shape = *particle_.shape;
+    return edged(shape) || -gap > kBluntest * particle_.scale * shape.curvature.min_radius;
+  }
+
+  // What the faces about a vertex make: a convex cone that has the body's centre outside or inside, or
+  // something else.
+  enum class Cone { outside, around, other };
+  Cone cone_at(int number) const {
+    const MeshPatch::Vertex& v = patch_.vertices()[number];
+    bool outside = false;
+    for (int i = 0; i < v.cells; ++i) {
+      const Vec3& n = patch_.planes()[patch_.cells()[patch_.cell_at(v.first_cell + i)].plane].normal;
+      double low = 0, high = 0;
+      for (int k = 0; k < v.edges; ++k) {
+        const MeshPatch::Edge& e = patch_.edges()[patch_.edge_at(v.first_edge + k)];
+        if (e.sides != 2) return Cone::other;
+        const double height = (e.v[0] == number ? 1 : -1) * n.dot(e.direction);
+        low = std::min(low, height);
+        high = std::max(high, height);
+      }
+      if (std::min(-low, high) > kOneSide) return Cone::other;
+      const double off = n.dot(particle_.x - v.x);
+      outside = outside || (high > -low ? off < 0 : off > 0);
+    }
+    return outside ? Cone::outside : Cone::around;
+  }
+
+  // The normals of the wall at an edge that stands out towards the body: from one face's to the other's,
+  // whatever side of the planes the body's centre is on; at a border, the half turn from one side to the
+  // other. False at an edge that does not.
+  bool outer_arc(const MeshPatch::Edge& e, Arc* arc) const {
+    if (e.inner || e.sides > 2) return false;
+    Vec3 inward[2], normal[2];
+    for (int i = 0; i < e.sides; ++i) {
+      normal[i] = patch_.planes()[plane_of(e, i)].normal;
+      inward[i] = into(e, i);
+    }
+    const Vec3 off = particle_.x - patch_.vertices()[e.v[0]].x;
+    if (e.sides == 1) {
+      if (normal[0].dot(off) < 0) normal[0] = -normal[0];
+      *arc = {normal[0], -inward[0], M_PI};
+      return true;
+    }
+    // The body is between the faces if its centre is on the other's side of each; where the centre is beyond
+    // an end, the vertex there knows better.
+    const double along = e.direction.dot(off);
+    const Cone cone = along < 0 ? cone_at(e.v[0]) : along > e.length ? cone_at(e.v[1]) : Cone::other;
+    if (cone == Cone::around) return false;
+    const double across = inward[0].cross(inward[1]).dot(e.direction);
+    if (cone == Cone::other && inward[0].cross(off).dot(e.direction) * across >= 0 &&
+        off.cross(inward[1]).dot(e.direction) * across >= 0)
+      return false;
+    for (int i = 0; i < 2; ++i)
+      if (inward[1 - i].dot(normal[i]) > 0) normal[i] = -normal[i];
+    const double cosine = normal[0].dot(normal[1]);
+    const Vec3 side = normal[1] - cosine * normal[0];
+    if (!(side.norm() > 1e-12)) return false;
+    *arc = {normal[0], side.normalized(), std::atan2(normal[0].cross(normal[1]).norm(), cosine)};
+    return true;
+  }
+
+  int plane_of(const MeshPatch::Edge& e, int side) const {
+    return patch_.cells()[patch_.side(e.first_side + side).cell].plane;
+  }
+  // The contact of a piece, unless there is none or it was dropped.
+  const SurfaceContact* kept(int contact) const {
+    return contact < 0 || dropped_[contact] ? nullptr : &out_.contact[contact];
+  }
+  Vec3 on_wall(const SurfaceContact& c) const { return particle_.x + c.on_body - c.gap * c.normal; }
+
+  // From an edge into the cell of a side of it.
+  Vec3 into(const MeshPatch::Edge& e, int side) const {
+    const MeshPatch::Side& s = patch_.side(e.first_side + side);
+    return s.sign * patch_.planes()[patch_.cells()[s.cell].plane].normal.cross(e.direction);
+  }
+
+  // The contact of the plane of an edge's side, if it is where a wedge about the edge has it and the way out
+  // of the wedge may be shorter: along a normal of it turned by t, the deepest point of the body, `in` from
+  // the edge, is deeper than -gap cos(t) + in sin(t).
+  const SurfaceContact* contact_beside(const MeshPatch::Edge& e, int side, const Arc& arc, double low,
+                                       double high) const {
+    const SurfaceContact* c = kept(planes_[plane_of(e, side)].contact);
+    if (!c) return nullptr;
+    const Vec3 inward = into(e, side), y = on_wall(*c) - patch_.vertices()[e.v[0]].x;
+    const double in = inward.dot(y), along = e.direction.dot(y);
+    if (in < -kWithin * radius_ || along < low + c->gap || along > high - c->gap) return nullptr;
+    const bool behind = e.sides == 2 && c->normal.dot(arc.end(side)) < 0;  // its way out leads into the wall
+    if (!behind && in * std::sin(arc.span) >= -c->gap * (1 - std::cos(arc.span))) return nullptr;
+    return c;
+  }
+
+  // Leaves a contact out, for another if there is one.
+  void drop(const SurfaceContact* c, int other = -1) {
+    if (!c) return;
+    const auto number = c - out_.contact;
+    dropped_[number] = true;
+    instead_[number] = other;
+  }
+  // The one that is kept for a contact, itself if it is; -1 for none.
+  int instead_of(int contact) const {
+    while (contact >= 0 && dropped_[contact]) contact = instead_[contact];
+    return contact;
+  }
+
+  // Whether a contact is deeper than a way out that leaves it out. A flat feature that stands on a plane is
+  // not given up for a little.
+  static bool deeper(const SurfaceContact* c, double gap) {
+    return !c || (c->flat ? kStanding : 1) * c->gap < gap;
+  }
+
+  // The edges that go on straight from one, between the same planes, as pieces of its line.
+  const std::vector<Stretch>& straight_on(int number) {
+    std::vector<Stretch>& line = workspace().line;
+    const MeshPatch::Edge& e = patch_.edges()[number];
+    line.assign(1, {number, 0, e.length});
+    for (const int way : {1, 0}) {
+      int last = number, v = e.v[way];
+      double at = way ? e.length : 0;
+      for (bool found = true; found && line.size() < patch_.edges().size();) {
+        found = false;
+        const MeshPatch::Vertex& vertex = patch_.vertices()[v];
+        for (int i = 0; i < vertex.edges && !found; ++i) {
+          const int next = patch_.edge_at(vertex.first_edge + i);
+          const MeshPatch::Edge& n = patch_.edges()[next];
+          const double sign = (n.v[0] == v ? 1 : -1) * (way ? 1 : -1);
+          found = next != last && !n.inner && sign * n.direction.dot(e.direction) > kStraightOn &&
+                  same_planes(n, e);
+          if (!found) continue;
+          const double to = at + (way ? n.length : -n.length);
+          line.push_back({next, std::min(at, to), std::max(at, to)});
+          at = to;
+          v = n.v[n.v[0] == v ? 1 : 0];
+          last = next;
+        }
+      }
+    }
+    return line;
+  }
+  bool same_planes(const MeshPatch::Edge& a, const MeshPatch::Edge& b) const {
+    if (a.sides != b.sides) return false;
+    if (a.sides == 1) return plane_of(a, 0) == plane_of(b, 0);
+    return (plane_of(a, 0) == plane_of(b, 0) && plane_of(a, 1) == plane_of(b, 1)) ||
+           (plane_of(a, 0) == plane_of(b, 1) && plane_of(a, 1) == plane_of(b, 0));
+  }
+  // Whether edges that go straight on meet at a vertex.
+  bool is_on_line(int number) const {
+    const MeshPatch::Vertex& v = patch_.vertices()[number];
+    for (int i = 0; i < v.edges; ++i)
+      for (int k = 0; k < i; ++k) {
+        const MeshPatch::Edge &a = patch_.edges()[patch_.edge_at(v.first_edge + i)],
+                              &b = patch_.edges()[patch_.edge_at(v.first_edge + k)];
+        if (!a.inner && !b.inner && std::abs(a.direction.dot(b.direction)) > kStraightOn) return true;
+      }
+    return false;
+  }
+
+  // An edge that stands out, with those that go straight on from it.
+  void touch_outer_edge(int number, const Arc& arc, bool active) {
+    const MeshPatch::Edge& e = patch_.edges()[number];
+    const Vec3& a = patch_.vertices()[e.v[0]].x;
+    const std::vector<Stretch>& line = straight_on(number);
+    double low = 0, high = 0;
+    for (const Stretch& piece : line) {
+      low = std::min(low, piece.from);
+      high = std::max(high, piece.to);
+    }
+    const auto say = [&](MetEdge::State state) {
+      for (const Stretch& piece : line) edges_[piece.edge].state = state;
+    };
+    say(MetEdge::unknown);
+    const Vec3 apart = particle_.x - a;
+    if ((apart - std::clamp(apart.dot(e.direction), low, high) * e.direction).squaredNorm() > radius_ * radius_)
+      return say(MetEdge::clear);
+    const SurfaceContact* beside[2] = {nullptr, nullptr};
+    bool free = active;  // no face of it has the body
+    for (int i = 0; i < e.sides; ++i) {
+      const int p = plane_of(e, i);
+      if (!planes_[p].active) continue;
+      beside[i] = contact_beside(e, i, arc, low, high);
+      if (planes_[p].claimed) free = false;
+      if (patch_.side(e.first_side + i).sign * inside(planes_[p], patch_.planes()[p], e) > 0 &&
+          kept(planes_[p].contact))
+        free = false;
+    }
+    if (!free && !beside[0] && !beside[1]) return;
+    double angle = 0;
+    SurfacePoint start;
+    FeatureContact f =
+        find_highest_line_contact(particle_, a, e.direction, arc, point_for(arc.low, &start), &angle);
+    if (!f.touching) {  // nor are they, whatever their planes say
+      for (const SurfaceContact* c : beside) drop(c);
+      return say(MetEdge::clear);
+    }
+    // Of a line of the body that lies along the edge, the middle of what is over it.
+    if (f.along_low < high && f.along_high > low && f.along_high - f.along_low > kLineLength * radius_) {
+      const double middle = 0.5 * (std::max(f.along_low, low) + std::min(f.along_high, high));
+      f.on_body += (middle - f.along) * e.direction;
+      f.along = middle;
+    }
+    int owner = -1;
+    for (const Stretch& piece : line) {
+      edges_[piece.edge].state = f.along < piece.from ? MetEdge::before : MetEdge::beyond;
+      if (f.along > low && f.along < high && f.along >= piece.from && f.along <= piece.to &&
+          (owner < 0 || piece.edge < owner))
+        owner = piece.edge;
+    }
+    // At an end of the arc a face has it, but for a line of the body that lies along the face: the plane's
+    // deepest point may be its end that is not over the face.
+    const int end = angle <= 0 ? 0 : angle >= arc.span ? 1 : -1;
+    ActivePlane* face = end >= 0 && end < e.sides ? &planes_[plane_of(e, end)] : nullptr;
+    const bool lies = face && face->active && instead_of(face->contact) < 0 && face->normal.dot(f.normal) > kSamePlane &&
+                      (std::abs(into(e, end).dot(apart + f.on_body)) < kWithin * radius_ ||
+                       is_over(plane_of(e, end), particle_.x + f.on_body));
+    if ((end < 0 || lies) && owner >= 0 && deeper(beside[0], f.gap) && deeper(beside[1], f.gap) &&
+        !(e.sides == 1 && covered(f, patch_.side(e.first_side).cell))) {
+      edges_[owner].state = MetEdge::along;
+      const MeshPatch::Edge& o = patch_.edges()[owner];
+      const auto triangle = [&](int i) {
+        return patch_.cells()[patch_.side(o.first_side + i).cell].triangle;
+      };
+      SurfaceContact c = surface_contact(f, triangle(0));
+      c.piece = SurfaceContact::edge;
+      c.of[0] = triangle(0);
+      c.of[1] = o.sides > 1 ? triangle(1) : -1;
+      const int contact = edges_[owner].contact = add(c);
+      for (const SurfaceContact* other : beside) drop(other, contact);
+      if (face) face->contact = contact;
+      return;
+    }
+    // The way out of the one face leads out of the other, if it is shorter.
+    for (int i = 0; i < 2 && e.sides == 2; ++i) {
+      const SurfaceContact* other = beside[1 - i];
+      const int there = instead_of(planes_[plane_of(e, i)].contact);
+      if (other && there >= 0 && kept(there) != other && out_.contact[there].gap > other->gap &&
+          f.gap > other->gap)
+        drop(other, there);
+    }
+  }
+
+  // A vertex all of whose edges stand out; false where one does not.
+  bool touch_outer_vertex(int number, const Vec3& guess) {
+    const MeshPatch::Vertex& v = patch_.vertices()[number];
+    const Cone cone = cone_at(number);
+    if (cone == Cone::around) return false;
+    if (is_on_line(number)) return true;  // a place of an edge, no more
+    Arc arc;
+    for (int i = 0; i < v.edges && cone == Cone::other; ++i) {
+      const MeshPatch::Edge& e = patch_.edges()[patch_.edge_at(v.first_edge + i)];
+      if (!e.inner && !outer_arc(e, &arc)) return false;
+    }
+    // Of its pieces' contacts the shallowest leads out of all of them. Those further away than a few times
+    // their depth have no shorter way out here.
+    const SurfaceContact* near[kSurfaceContacts];
+    int count = 0;
+    bool touched = false;
+    double most = -kFarAway;
+    const auto is_normal = [&](const Vec3& d) {
+      for (int i = 0; i < v.edges; ++i) {
+        const MeshPatch::Edge& e = patch_.edges()[patch_.edge_at(v.first_edge + i)];
+        if ((e.v[0] == number ? 1 : -1) * e.direction.dot(d) > kOneSide) return false;
+      }
+      return true;
+    };
+    const auto offer = [&](int contact) {
+      const SurfaceContact* c = kept(contact);
+      if (!c || std::find(near, near + count, c) != near + count) return;
+      if (is_normal(c->normal)) {
+        touched = true;
+        most = std::max(most, c->gap);
+      }
+      if ((on_wall(*c) - v.x).norm() <= -kNearVertex * c->gap) near[count++] = c;
+    };
+    for (int i = 0; i < v.edges; ++i) {
+      const int e = patch_.edge_at(v.first_edge + i);
+      if (patch_.edges()[e].inner) continue;
+      offer(edges_[e].contact);
+      if (edges_[e].state == MetEdge::clear) return true;
+    }
+    for (int i = 0; i < v.cells; ++i)
+      offer(planes_[patch_.cells()[patch_.cell_at(v.first_cell + i)].plane].contact);
+    if (touched && count == 0) return true;
+    SurfacePoint start;
+    const FeatureContact f = find_point_contact(particle_, v.x, guess, settings_, point_for(guess, &start));
+    bool out = f.touching && is_normal(f.normal);
+    out = out && f.gap > most;
+    if (out) most = f.gap;
+    int best = -1;
+    if (out) {
+      SurfaceContact c = surface_contact(f, patch_.cells()[patch_.cell_at(v.first_cell)].triangle);
+      c.piece = SurfaceContact::vertex;
+      c.of[0] = v.triangle;
+      c.of[1] = v.corner;
+      best = add(c);
+    }
+    for (int i = 0; i < count; ++i)
+      if (near[i]->gap < most) drop(near[i], best);
+    return true;
   }
 
   // Directions around an edge between which the contact's lies: the slope of f, when d turns about the edge,
@@ -401,6 +782,18 @@ class SurfaceSearch {
     return f;
   }
 
+  // Whether the body does not meet the line of an edge.
+  bool passes_by(const MeshPatch::Edge& e) const {
+    const Vec3 low = e.direction.unitOrthogonal(), side = e.direction.cross(low);
+    double angle;
+    for (const Vec3& towards : {side, Vec3(-side)})
+      if (!find_highest_line_contact(particle_, patch_.vertices()[e.v[0]].x, e.direction,
+                                     {low, towards, M_PI}, nullptr, &angle)
+               .touching)
+        return true;
+    return false;
+  }
+
   FeatureContact at_plane(const ActivePlane& met) const {
     FeatureContact f;
     f.touching = true;
@@ -421,7 +814,18 @@ class SurfaceSearch {
 
   void touch_edge(int number) {
     const MeshPatch::Edge& e = patch_.edges()[number];
-    if (e.inner || !all_open(e)) return;
+    if (e.inner) return;
+    double deepest = 0;
+    bool active = true;
+    for (int i = 0; i < e.sides; ++i) {
+      const ActivePlane& met = planes_[plane_of(e, i)];
+      active = active && met.active;
+      if (met.active) deepest = std::min(deepest, met.result.gap);
+    }
+    edges_[number].state = MetEdge::unknown;
+    Arc arc;
+    if (finds_sharp(deepest) && outer_arc(e, &arc)) return touch_outer_edge(number, arc, active);
+    if (!all_open(e)) return;
     int weight = 1;
     for (int i = e.first_side; i < e.first_side + e.sides; ++i) {
       const MeshPatch::Side& side = patch_.side(i);
@@ -437,6 +841,10 @@ class SurfaceSearch {
     Range r;
     SurfacePoint start;
     const bool smooth = range(e, &r);
+    if (!smooth && passes_by(e)) {
+      edges_[number].state = MetEdge::clear;
+      return;
+    }
     const FeatureContact f =
         smooth ? find_line_contact(particle_, a, e.direction, r.low, r.high, 0, point_for(r.low, &start))
                : pointed(e);
@@ -461,14 +869,7 @@ class SurfaceSearch {
       if (static_cast<int>(c) == own || !planes_[cell.plane].active) continue;
       const MeshPatch::Plane& plane = patch_.planes()[cell.plane];
       if (std::abs(plane.normal.dot(y - plane.origin)) > kWithin * radius_) continue;
-      bool in = true;
-      for (int k = 0; k < cell.corners && in; ++k) {
-        const int edge = patch_.edge_of(cell.first + k);
-        const MeshPatch::Edge& e = patch_.edges()[edge];
-        const double s = plane.normal.cross(e.direction).dot(y - patch_.vertices()[e.v[0]].x);
-        in = patch_.sign_of(cell.first + k) * s > -kWithin * radius_;
-      }
-      if (in) return true;
+      if (in_cell(cell, y)) return true;
     }
     return false;
   }
@@ -478,12 +879,18 @@ class SurfaceSearch {
     if (v.inner || v.cells == 0) return;
     if ((particle_.x - v.x).squaredNorm() > radius_ * radius_) return;
     const ActivePlane* shallowest = nullptr;
+    bool claimed = false;
+    double deepest = 0;
     for (int i = 0; i < v.cells; ++i) {
       const int plane = patch_.cells()[patch_.cell_at(v.first_cell + i)].plane;
       const ActivePlane& met = planes_[plane];
-      if (!met.active || met.claimed) return;
+      if (!met.active) return;
+      claimed = claimed || met.claimed;
+      deepest = std::min(deepest, met.result.gap);
       if (!shallowest || met.result.gap > shallowest->result.gap) shallowest = &met;
     }
+    if (finds_sharp(deepest) && touch_outer_vertex(number, shallowest->normal)) return;
+    if (claimed) return;
     if (edged(*particle_.shape) && lies_under(number))
       return add_feature(at_plane(*shallowest), 1, patch_.cells()[patch_.cell_at(v.first_cell)].triangle,
                          SurfaceContact::under_vertex, v.triangle, v.corner);
@@ -491,7 +898,7 @@ class SurfaceSearch {
       if (state(patch_.edge_at(v.first_edge + i)) == MetEdge::clear) return;
     SurfacePoint start;
     const FeatureContact f =
-        find_point_contact(particle_, v.x, shallowest->normal, point_for(shallowest->normal, &start));
+        find_point_contact(particle_, v.x, shallowest->normal, settings_, point_for(shallowest->normal, &start));
     if (!f.touching) return;
     int weight = 1;
     for (int i = 0; i < v.edges; ++i) {
@@ -561,9 +968,14 @@ class SurfaceSearch {
     c.piece = piece;
     c.of[0] = first;
     c.of[1] = second;
-    out_.add(c);
+    add(c);
   }
 
+  static constexpr double kNearVertex = 4;  // overlaps
+  static constexpr double kOneSide = 1e-9;  // rad
+  static constexpr double kStanding = 0.5;
+  static constexpr double kLineLength = 1e-4;  // of the bounding radius: of a point there is less
+  static constexpr double kStraightOn = 1 - 1e-12;  // cosine
   static constexpr double kWithin = 1e-9;  // of the bounding radius: on a cell
 
   const Particle& particle_;
@@ -573,6 +985,8 @@ class SurfaceSearch {
   const FormerContact* former_;
   const int former_count_;
   SurfaceContacts& out_;
+  bool dropped_[kSurfaceContacts];
+  int instead_[kSurfaceContacts];  // of those that are: a contact added later, or -1
   std::vector<ActivePlane>& planes_;
   std::vector<MetEdge>& edges_;
 };
