@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "body/support.h"
 #include "contact/local_model.h"
@@ -328,26 +329,6 @@ bool find_foot(const Particle& particle, const Vec3& a, Vec3 d, const SurfacePoi
   return false;
 }
 
-// The contact of a ball about `a`, less the ball's radius: as far as the shortest way out of the body goes, a
-// point and a ball are the same.
-FeatureContact find_way_out(const Particle& particle, const Vec3& a, const ContactSettings& settings) {
-  static const std::shared_ptr<const Shape> kBall = make_shape("ball", exact_ellipsoid(Vec3::Ones()));
-  Particle ball;
-  ball.shape = kBall.get();
-  ball.x = a;
-  ball.scale = kBallShare * particle.scale * particle.shape->bounding_radius;
-  PairMemory memory{};
-  const ContactResult r = find_contact(ball, particle, settings, reinterpret_cast<double*>(&memory));
-  FeatureContact c;
-  c.gap = r.gap + ball.scale * roundness(*kBall).radius;
-  c.touching = r.status != Status::separated && c.gap < 0;
-  if (!c.touching) return c;
-  c.normal = r.normal;
-  c.on_body = a - particle.x + c.gap * r.normal;
-  c.where = warm_point(memory.on_b, *particle.shape);
-  return c;
-}
-
 }  // namespace
 
 FeatureGap gap_along(const Particle& particle, const Vec3& a, const Vec3& d, const SurfacePoint* start) {
@@ -369,6 +350,25 @@ FeatureContact find_line_contact(const Particle& particle, const Vec3& a, const 
 FeatureContact find_highest_line_contact(const Particle& particle, const Vec3& a, const Vec3& direction,
                                          const Arc& arc, const SurfacePoint* start, double* angle) {
   return LineSearch(particle, a, direction, arc, start).run_over_all(angle);
+}
+
+FeatureContact find_way_out(const Particle& particle, const Vec3& a, const ContactSettings& settings) {
+  static const std::shared_ptr<const Shape> kBall = make_shape("ball", exact_ellipsoid(Vec3::Ones()));
+  Particle ball;
+  ball.shape = kBall.get();
+  ball.x = a;
+  ball.scale = kBallShare * particle.scale * particle.shape->bounding_radius;
+  ContactSettings full = settings;
+  full.reach = std::numeric_limits<double>::infinity();
+  PairMemory memory{};
+  const ContactResult r = find_contact(ball, particle, full, reinterpret_cast<double*>(&memory));
+  FeatureContact c;
+  c.gap = r.gap + ball.scale * roundness(*kBall).radius;
+  c.touching = c.gap < 0;
+  c.normal = r.normal;
+  c.on_body = a - particle.x + c.gap * r.normal;
+  c.where = warm_point(memory.on_b, *particle.shape);
+  return c;
 }
 
 FeatureContact find_point_contact(const Particle& particle, const Vec3& a, const Vec3& guess,

@@ -17,7 +17,7 @@ namespace nurbs {
 constexpr double kLineLevel = 1e-9;
 
 struct FeatureContact {
-  bool touching = false;        // else nothing below means anything
+  bool touching = false;        // else nothing below means anything, but for points
   double gap = 0;               // < 0
   Vec3 normal = Vec3::Zero();   // unit d, lab
   Vec3 on_body = Vec3::Zero();  // the body's deepest point, relative to its centre of mass, lab axes
@@ -49,9 +49,13 @@ FeatureContact find_highest_line_contact(const Particle& particle, const Vec3& a
 
 // The shortest way out of the body for a point `a`, in any direction; `guess` is one near it. Newton by the
 // body's curvature, 2 to 4 support searches; where that fails (kinks, flats) or another way may be shorter
-// (deeper than the least curvature radius), the contact of the body with a ball about the point.
+// (deeper than the least curvature radius), find_way_out. Not touching, `normal` is a direction with f >= 0.
 FeatureContact find_point_contact(const Particle& particle, const Vec3& a, const Vec3& guess,
                                   const ContactSettings& settings, const SurfacePoint* start);
+
+// The same by the contact of the body with a ball about the point, less the ball's radius. Of a point outside
+// the body, gap and normal are those of the shortest distance.
+FeatureContact find_way_out(const Particle& particle, const Vec3& a, const ContactSettings& settings);
 
 // f(d) along a unit direction, with the body's support point.
 struct FeatureGap {

@@ -715,9 +715,12 @@ class SurfaceSearch {
       offer(planes_[patch_.cells()[patch_.cell_at(v.first_cell + i)].plane].contact);
     if (touched && count == 0) return true;
     SurfacePoint start;
-    const FeatureContact f = find_point_contact(particle_, v.x, guess, settings_, point_for(guess, &start));
-    bool out = f.touching && is_normal(f.normal);
-    out = out && f.gap > most;
+    FeatureContact f = find_point_contact(particle_, v.x, guess, settings_, point_for(guess, &start));
+    if (!f.touching && count > 0) {  // nor are its pieces, where a direction parts the body from all of them
+      if (!is_normal(f.normal)) f = find_way_out(particle_, v.x, settings_);
+      if (is_normal(f.normal)) most = kFarAway;
+    }
+    const bool out = f.touching && is_normal(f.normal) && f.gap > most;
     if (out) most = f.gap;
     int best = -1;
     if (out) {
