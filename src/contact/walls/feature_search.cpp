@@ -329,6 +329,49 @@ bool find_foot(const Particle& particle, const Vec3& a, Vec3 d, const SurfacePoi
   return false;
 }
 
+// --- a polygon
+
+constexpr int kApartSteps = 40;
+
+// The point nearest to the origin of the line, plane or space through N + 1 points, if it lies between them:
+// q0 + sum w_i (q_i - q0), square to all the sides.
+template <int N>
+bool foot_between(const Vec3* q, Vec3* y) {
+  Eigen::Matrix<double, 3, N> sides;
+  for (int i = 0; i < N; ++i) sides.col(i) = q[i + 1] - q[0];
+  const Eigen::Matrix<double, N, 1> w = sides.colPivHouseholderQr().solve(-q[0]);
+  *y = q[0] + sides * w;
+  return w.minCoeff() >= 0 && w.sum() <= 1;
+}
+
+// That of the hull of up to four points; leaves those that make it.
+Vec3 nearest_to_origin(Vec3* p, int* count) {
+  double least = kFarAway;
+  Vec3 best = Vec3::Zero();
+  int kept = 0;
+  for (int set = 1; set < 1 << *count; ++set) {
+    Vec3 q[4], y;
+    int n = 0;
+    for (int i = 0; i < *count; ++i)
+      if (set >> i & 1) q[n++] = p[i];
+    bool between = true;
+    if (n == 1)
+      y = q[0];
+    else if (n == 2)
+      between = foot_between<1>(q, &y);
+    else if (n == 3)
+      between = foot_between<2>(q, &y);
+    else
+      between = foot_between<3>(q, &y);
+    if (between && y.squaredNorm() < least) least = y.squaredNorm(), best = y, kept = set;
+  }
+  int n = 0;
+  for (int i = 0; i < *count; ++i)
+    if (kept >> i & 1) p[n++] = p[i];
+  *count = n;
+  return best;
+}
+
 }  // namespace
 
 FeatureGap gap_along(const Particle& particle, const Vec3& a, const Vec3& d, const SurfacePoint* start) {
@@ -350,6 +393,24 @@ FeatureContact find_line_contact(const Particle& particle, const Vec3& a, const 
 FeatureContact find_highest_line_contact(const Particle& particle, const Vec3& a, const Vec3& direction,
                                          const Arc& arc, const SurfacePoint* start, double* angle) {
   return LineSearch(particle, a, direction, arc, start).run_over_all(angle);
+}
+
+bool is_clear_of(const Particle& particle, const Vec3* points, int count) {
+  Vec3 simplex[4];
+  int size = 0;
+  Vec3 d = particle.x - points[0];
+  for (int k = 0; k < kApartSteps; ++k) {
+    if (!(d.norm() > kRoundoff * particle.scale * particle.shape->bounding_radius)) return false;
+    d.normalize();
+    const Vec3* far = std::max_element(
+        points, points + count, [&](const Vec3& p, const Vec3& q) { return d.dot(p) < d.dot(q); });
+    const FeatureGap g = gap_along(particle, *far, d, nullptr);
+    if (g.gap > 0) return true;
+    simplex[size++] = particle.x - *far + g.on_body;
+    d = nearest_to_origin(simplex, &size);
+    if (size == 4) return false;
+  }
+  return false;
 }
 
 FeatureContact find_way_out(const Particle& particle, const Vec3& a, const ContactSettings& settings) {

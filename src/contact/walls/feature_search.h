@@ -57,6 +57,10 @@ FeatureContact find_point_contact(const Particle& particle, const Vec3& a, const
 // the body, gap and normal are those of the shortest distance.
 FeatureContact find_way_out(const Particle& particle, const Vec3& a, const ContactSettings& settings);
 
+// Whether a direction parts the body from the convex hull of `count` points. Gilbert, Johnson & Keerthi 1988;
+// not said of bodies that all but touch it.
+bool is_clear_of(const Particle& particle, const Vec3* points, int count);
+
 // f(d) along a unit direction, with the body's support point.
 struct FeatureGap {
   double gap;

@@ -52,6 +52,7 @@ struct Workspace {
   std::vector<MetEdge> edges;
   std::vector<int> active;
   std::vector<Stretch> line;
+  std::vector<Vec3> corners;
 };
 Workspace& workspace() {
   static thread_local Workspace w;
@@ -208,12 +209,10 @@ class SurfaceSearch {
       }
       if (!over) {  // the plane's deepest point is beside the wall; the polygon's is on it
         if (!polygon_over(region, -reach * gap, &gap, &on_body)) return false;
-        add_plane(number, triangle, true, gap, on_body);
-        return true;
+        return add_plane(number, triangle, true, gap, on_body);
       }
     }
-    add_plane(number, triangle, true, met.result.gap, met.deepest);
-    return true;
+    return add_plane(number, triangle, true, met.result.gap, met.deepest);
   }
 
   bool stood_on(const Vec3& normal) const {
@@ -358,41 +357,32 @@ class SurfaceSearch {
     const ActivePlane& met = planes_[number];
     const int cell = patch_.unbounded() ? -1 : cell_below(number);
     if (!patch_.unbounded() && cell < 0) return;
-    if (!patch_.unbounded() && finds_sharp(met.result.gap) && passes_by_face(number)) return;
     add_plane(number, cell < 0 ? 0 : patch_.cells()[cell].triangle, false, met.result.gap, met.deepest);
   }
 
-  // Whether a body's deepest point is above a face that the body does not meet, as it passes by its border.
-  // It has its centre and its deepest point and all between; beyond the side over which that line leaves the
-  // face there may be a direction that parts the two.
-  bool passes_by_face(int number) {
-    const ActivePlane& met = planes_[number];
+  // Whether the deepest point of a body is over a face that the body does not meet: it may be on the other
+  // side of the plane, as the body passes by the face's border.
+  bool passes_by(int number, const Vec3& deepest, double gap) const {
+    if (patch_.unbounded() || !finds_sharp(gap)) return false;
+    // Of the line from the centre to the deepest point, all of which the body has, the point in the plane.
+    const double slope = planes_[number].normal.dot(-deepest);
+    if (slope > 0 && is_over(number, particle_.x + deepest + gap / slope * deepest)) return false;
     const MeshPatch::Plane& plane = patch_.planes()[number];
-    const double slope = met.normal.dot(-met.deepest);
-    if (!(slope > 0)) return false;
-    const Vec3 from = particle_.x + met.deepest - met.result.gap * met.normal;
-    const Vec3 to = particle_.x + met.deepest + met.result.gap / slope * met.deepest;  // where it crosses the plane
-    for (int i = 0; i < plane.edges; ++i) {
-      const MeshPatch::Edge& e = patch_.edges()[patch_.edge_in(plane.first_edge + i)];
-      const Vec3& a = patch_.vertices()[e.v[0]].x;
-      for (int k = 0; k < e.sides; ++k) {
-        if (plane_of(e, k) != number) continue;
-        const Vec3 inward = into(e, k);
-        const double start = inward.dot(from - a), end = inward.dot(to - a);
-        if (!(start >= 0 && end < 0)) continue;
-        const double along = e.direction.dot(from + start / (start - end) * (to - from) - a);
-        if (along < 0 || along > e.length) continue;
-        double angle;
-        return !find_highest_line_contact(particle_, a, e.direction, {met.normal, -inward, 0.5 * M_PI},
-                                          nullptr, &angle)
-                    .touching;
-      }
+    for (int i = 0; i < plane.cells; ++i) {
+      const MeshPatch::Cell& cell = patch_.cells()[patch_.cell_in(plane.first + i)];
+      if (!in_cell(cell, particle_.x + deepest)) continue;
+      std::vector<Vec3>& corners = workspace().corners;
+      corners.clear();
+      for (int k = cell.first; k < cell.first + cell.corners; ++k)
+        corners.push_back(patch_.vertices()[patch_.corner(k)].x);
+      if (!is_clear_of(particle_, corners.data(), cell.corners)) return false;
     }
-    return false;
+    return true;
   }
 
-  void add_plane(int number, int triangle, bool flat, double gap, const Vec3& on_body) {
+  bool add_plane(int number, int triangle, bool flat, double gap, const Vec3& on_body) {
     ActivePlane& met = planes_[number];
+    if (passes_by(number, on_body, gap)) return false;
     SurfaceContact c;
     c.flat = flat;
     c.gap = gap;
@@ -406,6 +396,7 @@ class SurfaceSearch {
     c.converged = met.result.status == Status::converged;
     c.memory = met.memory;
     met.contact = add(c);
+    return true;
   }
 
   // Number of the contact, -1 where there is no more room.
@@ -643,7 +634,8 @@ class SurfaceSearch {
     // deepest point may be its end that is not over the face.
     const int end = angle <= 0 ? 0 : angle >= arc.span ? 1 : -1;
     ActivePlane* face = end >= 0 && end < e.sides ? &planes_[plane_of(e, end)] : nullptr;
-    const bool lies = face && face->active && instead_of(face->contact) < 0 && face->normal.dot(f.normal) > kSamePlane &&
+    const int opposite = face && e.sides == 2 ? instead_of(planes_[plane_of(e, 1 - end)].contact) : -1;
+    const bool lies = face && face->active && !(opposite >= 0 && out_.contact[opposite].gap > f.gap) && instead_of(face->contact) < 0 && face->normal.dot(f.normal) > kSamePlane &&
                       (std::abs(into(e, end).dot(apart + f.on_body)) < kWithin * radius_ ||
                        is_over(plane_of(e, end), particle_.x + f.on_body));
     if ((end < 0 || lies) && owner >= 0 && deeper(beside[0], f.gap) && deeper(beside[1], f.gap) &&
