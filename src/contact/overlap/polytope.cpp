@@ -18,6 +18,7 @@ constexpr int kPointAttempts = 2;     // flat differences of points may have no 
 constexpr int kBeforeRings = 64;      // queries before rings of directions are looked for ...
 constexpr int kBentBeforeRings = 95;  // ... of bodies without sharp edges, which caps may do for ...
 constexpr int kAtPoles = 256;         // ... and where the least overlap is along an axis
+constexpr double kBroken = 64;        // round-offs by which the ends of a bracket may cross
 constexpr double kPolar = 0.1;        // sine of the angle from it
 constexpr double kOneCentre =
     0.03;  // of the balls' radii inside: nearly balls further apart have one direction
@@ -58,7 +59,9 @@ PolytopeResult both(const PairFrame& pair, const PolytopeResult& x, const Polyto
   PolytopeResult r = y.bracket.width() < x.bracket.width() ? y : x;
   const Bracket& higher = y.bracket.lower > x.bracket.lower ? y.bracket : x.bracket;
   r.bracket.lower = higher.lower;
-  r.bracket.upper = std::max(std::min(x.bracket.upper, y.bracket.upper), higher.lower);
+  // Lower ends are supports' and hold; an upper one below another's lower end is a broken hull's.
+  const auto [low, high] = std::minmax({x.bracket.upper, y.bracket.upper});
+  r.bracket.upper = std::max(low < higher.lower - kBroken * pair.roundoff ? high : low, higher.lower);
   r.bracket.direction = r.points.na = higher.direction;
   r.points.nb = -higher.direction;
   r.converged = r.bracket.width() <= tolerance;

@@ -100,7 +100,7 @@ void PolytopeSearch::run(double enough, int most) {
   for (int idle = 0; hull_.points() < most; ++idle) {
     if (lower_caps_) lower_caps();
     const int near = best_face();
-    if (near < 0 || upper_ - lower_ <= tolerance_ || lower_ > enough) return;
+    if (near < 0 || is_broken() || upper_ - lower_ <= tolerance_ || lower_ > enough) return;
     if (!hopeless_ && pace.is_hopeless(hull_.points(), upper_ - lower_, tolerance_)) {
       hopeless_ = true;  // once
       return;
@@ -117,7 +117,7 @@ void PolytopeSearch::run(double enough, int most) {
     asked = corners;
     asked_along = direction_to_ask_;
     const int v = query(direction_to_ask_, closest_of(hull_.face(near), direction_to_ask_));
-    if (v < 0 || upper_ - lower_ <= tolerance_) return;
+    if (v < 0 || is_broken() || upper_ - lower_ <= tolerance_) return;
     GrowingHull::Growth growth = hull_.grow(v, least_height(), near);
     // Beyond a needle's edge a point is hardly above either face.
     if (growth == GrowingHull::Growth::inside) growth = hull_.grow(v, 0.25 * roundoff(), near);
@@ -139,12 +139,19 @@ void PolytopeSearch::let_be() {
   balances_ = kMostBalances;
 }
 
+// The supports' bound holds whatever the hull is: one that says less than that by more than round-off is none,
+// and neither is anything else that it said.
+bool PolytopeSearch::is_broken() {
+  if (broken_ || !(upper_ < lower_ - 2 * roundoff())) return broken_;
+  return stalled_ = broken_ = true;
+}
+
 PolytopeResult PolytopeSearch::bracket() const {
   PolytopeResult r;
   r.iterations = queries_;
   r.bracket.lower = lower_;
-  r.bracket.upper = std::max(upper_, lower_);
-  r.converged = upper_ - lower_ <= tolerance_;
+  r.bracket.upper = broken_ ? std::max(known_, lower_) : std::max(upper_, lower_);
+  r.converged = r.bracket.upper - lower_ <= tolerance_;
   r.bracket.direction = direction_;
   return r;
 }

@@ -32,7 +32,7 @@ class PolytopeSearch {
   PolytopeSearch(const PairFrame& pair, double tolerance, double joggle, bool points);
 
   // What is known of the gap besides.
-  void bound(double upper) { upper_ = upper; }
+  void bound(double upper) { upper_ = known_ = upper; }
   // Leaves minima alone: where a support's points lie close together (a small body on a crease), rings of
   // more of them break the hull.
   void let_be();
@@ -86,6 +86,7 @@ class PolytopeSearch {
   PolytopeSearch(const PolytopeSearch& whole, int from, double valid, double shrink_a, double shrink_b);
 
   double roundoff() const { return pair_.roundoff + rise_ + 2 * joggle_ + error_; }
+  bool is_broken();
   // A point less high above a face than this is not worth adding: the bracket is as good as closed there.
   double least_height() const { return std::max(0.25 * roundoff(), kLeastHeight * tolerance_); }
   static HullPoints hull_points(const Shape& shape, double scale, double tolerance);
@@ -150,9 +151,10 @@ class PolytopeSearch {
   double valid_ = M_PI;  // what the cores hold for: directions within it of the middle
   Vec3 middle_ = Vec3::Zero();
   double lower_ = -kFarAway, upper_ = kFarAway, near_ = -kFarAway;
+  double known_ = kFarAway;  // upper end by other means than the hull
   Vec3 direction_ = Vec3::UnitX(), direction_to_ask_ = Vec3::UnitX();
   int best_ = 0, queries_ = 0, balances_ = 0, minima_ = 0;
-  bool stalled_ = false, hopeless_ = false, lower_caps_ = false;
+  bool broken_ = false, stalled_ = false, hopeless_ = false, lower_caps_ = false;
   int caps_ = 0;
   Cap cap_[kMostMinima];
   Vec3 minimum_[kMostMinima];           // directions surrounded
