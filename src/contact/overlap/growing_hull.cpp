@@ -36,6 +36,30 @@ struct Edges {
 
 }  // namespace
 
+// Weights of the plane's foot, from the longest edge: how far from it, as a share of the third corner's height
+// over it, then where along it. Of a needle the share is hardly known, but no error of it moves the foot along.
+static Vec3 foot_weights(const Vec3& a, const Vec3& b, const Vec3& c) {
+  const Vec3* const corner[3] = {&a, &b, &c};
+  const double length2[3] = {(b - a).squaredNorm(), (c - b).squaredNorm(), (a - c).squaredNorm()};
+  const int i = length2[0] >= length2[1] ? (length2[0] >= length2[2] ? 0 : 2) : (length2[1] >= length2[2] ? 1 : 2),
+            j = (i + 1) % 3, k = (i + 2) % 3;
+  const Vec3 &p = *corner[i], &q = *corner[j], &r = *corner[k], edge = q - p;
+  // From the nearer ends, where differences keep their digits.
+  const bool from_q = q.squaredNorm() < p.squaredNorm(), side_q = (r - q).squaredNorm() < (r - p).squaredNorm();
+  const auto along = [&](const Vec3& x, bool from) {
+    return from ? 1 + edge.dot(x) / length2[i] : edge.dot(x) / length2[i];
+  };
+  const double t = from_q ? along(-q, true) : along(-p, false);
+  const Vec3 foot = from_q ? Vec3(q + (t - 1) * edge) : Vec3(p + t * edge);
+  const double tr = side_q ? along(r - q, true) : along(r - p, false);
+  const Vec3 up = side_q ? Vec3(r - q - (tr - 1) * edge) : Vec3(r - p - tr * edge);
+  Vec3 w;
+  w[k] = -foot.dot(up) / up.squaredNorm();
+  w[j] = t - w[k] * tr;
+  w[i] = 1 - w[j] - w[k];
+  return w;
+}
+
 // Corners may be a million times as far from the origin as its nearest point: differences are taken from the
 // corner nearest to the origin, where they keep their digits, and the normal is of the two shorter edges.
 Vec3 nearest_on_triangle(const Vec3& a, const Vec3& b, const Vec3& c) {
@@ -74,6 +98,8 @@ Vec3 nearest_on_triangle(const Vec3& a, const Vec3& b, const Vec3& c) {
   }
   const double sum = wp + wq + wr;
   if (!(sum > 0)) return w;
+  const Vec3 settled = foot_weights(a, b, c);
+  if (settled.minCoeff() > 0) return settled;
   w[i] = wp / sum;
   w[j] = wq / sum;
   w[k] = wr / sum;
