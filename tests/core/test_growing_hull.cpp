@@ -51,6 +51,25 @@ TEST(GrowingHull, a_tetrahedron_is_closed_and_knows_its_nearest_face) {
   EXPECT_NEAR(std::sqrt(near.distance2), 1 / std::sqrt(3.0), 1e-15);
 }
 
+// A needle along a line that passes the origin closely: corners 1 away, height and distance a 1e-11th of it.
+TEST(GrowingHull, foot_of_a_needle) {
+  Random random(7);
+  for (int k = 0; k < 2000; ++k) {
+    const Quat turn = random.turn();
+    const double height = random.log_uniform(1e-11, 1), in = random.uniform(0.1, 0.9) * height,
+                 off = random.log_uniform(1e-12, 1e-2), at = random.uniform(-0.9, 0.9);
+    // The third corner stands over the long side where the foot does, give or take.
+    Vec3 corner[3] = {Vec3(-1, -in, off), Vec3(1, -in, off), Vec3(at, height - in, off)};
+    const double between = in / height;
+    if (!(std::abs(at * between) < 1 - between)) continue;
+    for (Vec3& x : corner) x = turn * x;
+    const int first = random.below(3);
+    const Vec3 &a = corner[first], &b = corner[(first + 1) % 3], &c = corner[(first + 2) % 3];
+    const Vec3 w = nearest_on_triangle(a, b, c);
+    EXPECT_NEAR((w[0] * a + w[1] * b + w[2] * c).norm(), off, 1e-15 + 2e-3 * off) << k;
+  }
+}
+
 TEST(GrowingHull, stays_convex_and_closed_over_random_points) {
   Random random(1);
   for (int body = 0; body < 40; ++body) {

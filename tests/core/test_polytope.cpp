@@ -55,6 +55,34 @@ TEST(Polytope, box_penetration_equals_the_separating_axis_theorem) {
   EXPECT_GT(overlapping, 500);
 }
 
+// Their faces all but parallel, in both orders: needles in the hull, with corners up to 1e4 times as far from
+// the origin as its nearest point. The overlap is along the large box's normal.
+TEST(Polytope, small_boxes_on_large_ones) {
+  Random random(5);
+  const Vec3 half(1, 0.8, 0.6);
+  for (int k = 0; k < 20000; ++k) {
+    const double ratio = random.log_uniform(1e2, 1e4);
+    Particle small{cuboid().get(), 1 / ratio, Vec3::Zero(), random.turn_by(random.log_uniform(1e-12, 1e-1))};
+    const Particle large{cuboid().get(), 1, Vec3::Zero(), Quat::Identity()};
+    const double radius = small.scale * cuboid()->bounding_radius;
+    const double gap = radius * random.log_uniform(1e-12, 1e-2) * random.sign();
+    const double reach = small.scale * (small.q.toRotationMatrix().row(2).cwiseAbs() * half)(0);
+    small.x = Vec3(0, 0, half[2] + reach + gap) +
+              radius * random.log_uniform(1e-9, 10) * Vec3::UnitZ().cross(random.direction());
+    const double allowed = 1e-9 * radius + 16 * kRoundoff * large.scale * cuboid()->bounding_radius;
+    for (const bool swapped : {false, true}) {
+      double memory[kPairMemorySize] = {0};
+      const ContactResult r =
+          swapped ? find_contact(large, small, {}, memory) : find_contact(small, large, {}, memory);
+      ASSERT_NE(r.status, Status::unresolved) << k;
+      ASSERT_LE(r.lower, gap + allowed) << k;
+      if (r.status == Status::converged) {
+        ASSERT_GE(r.upper, gap - allowed) << k;
+      }
+    }
+  }
+}
+
 TEST(Polytope, aligned_faces_edges_and_corners) {
   ContactSettings settings;
   const auto gap = [&](const Vec3& x, const Quat& q) {

@@ -36,16 +36,19 @@ struct Edges {
 
 }  // namespace
 
-// Weights of the plane's foot, from the longest edge: how far from it, as a share of the third corner's height
-// over it, then where along it. Of a needle the share is hardly known, but no error of it moves the foot along.
+// Weights of the plane's foot, from the longest edge: how far from it, as a share of the third corner's
+// height over it, then where along it. Of a needle the share is hardly known, but no error of it moves the
+// foot along.
 static Vec3 foot_weights(const Vec3& a, const Vec3& b, const Vec3& c) {
   const Vec3* const corner[3] = {&a, &b, &c};
   const double length2[3] = {(b - a).squaredNorm(), (c - b).squaredNorm(), (a - c).squaredNorm()};
-  const int i = length2[0] >= length2[1] ? (length2[0] >= length2[2] ? 0 : 2) : (length2[1] >= length2[2] ? 1 : 2),
+  const int i = length2[0] >= length2[1] ? (length2[0] >= length2[2] ? 0 : 2)
+                                         : (length2[1] >= length2[2] ? 1 : 2),
             j = (i + 1) % 3, k = (i + 2) % 3;
   const Vec3 &p = *corner[i], &q = *corner[j], &r = *corner[k], edge = q - p;
   // From the nearer ends, where differences keep their digits.
-  const bool from_q = q.squaredNorm() < p.squaredNorm(), side_q = (r - q).squaredNorm() < (r - p).squaredNorm();
+  const bool from_q = q.squaredNorm() < p.squaredNorm(),
+             side_q = (r - q).squaredNorm() < (r - p).squaredNorm();
   const auto along = [&](const Vec3& x, bool from) {
     return from ? 1 + edge.dot(x) / length2[i] : edge.dot(x) / length2[i];
   };

@@ -139,8 +139,8 @@ void PolytopeSearch::let_be() {
   balances_ = kMostBalances;
 }
 
-// The supports' bound holds whatever the hull is: one that says less than that by more than round-off is none,
-// and neither is anything else that it said.
+// The supports' bound holds whatever the hull is: one that says less than that by more than round-off is
+// none, and neither is anything else that it said.
 bool PolytopeSearch::is_broken() {
   if (broken_ || !(upper_ < lower_ - 2 * roundoff())) return broken_;
   return stalled_ = broken_ = true;

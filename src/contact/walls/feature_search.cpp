@@ -78,7 +78,8 @@ class LineSearch {
     for (const double tilt : {kTilt, -kTilt}) {
       const FeatureGap g = gap_along(particle_, a_, (c.normal + tilt * direction_).normalized(), &c.where);
       const Vec3 y = particle_.x - a_ + g.on_body;
-      if (std::abs(across.dot(y)) > kTilt * kTilt * particle_.scale * particle_.shape->bounding_radius) continue;
+      if (std::abs(across.dot(y)) > kTilt * kTilt * particle_.scale * particle_.shape->bounding_radius)
+        continue;
       const double along = direction_.dot(y);
       c.along_low = std::min(c.along_low, along);
       c.along_high = std::max(c.along_high, along);
@@ -139,8 +140,8 @@ class LineSearch {
     return up ? finish(met[best], met[other]) : finish(met[other], met[best]);
   }
 
-  // f between two directions is at most what their supports would make of it, the lower of two sinusoids: that
-  // is highest at an end, where they meet, or where the lower one is.
+  // f between two directions is at most what their supports would make of it, the lower of two sinusoids:
+  // that is highest at an end, where they meet, or where the lower one is.
   double bound_between(const Turned& low, const Turned& high, double* where) const {
     const auto sinusoid = [&](const Turned& t) {
       const Vec3 y = particle_.x - a_ + t.at.on_body;
@@ -339,7 +340,8 @@ template <int N>
 bool foot_between(const Vec3* q, Vec3* y) {
   Eigen::Matrix<double, 3, N> sides;
   for (int i = 0; i < N; ++i) sides.col(i) = q[i + 1] - q[0];
-  const Eigen::Matrix<double, N, 1> w = sides.colPivHouseholderQr().solve(-q[0]);
+  const Eigen::Matrix<double, N, N> gram = sides.transpose() * sides;
+  const Eigen::Matrix<double, N, 1> w = gram.inverse() * (sides.transpose() * -q[0]);
   *y = q[0] + sides * w;
   return w.minCoeff() >= 0 && w.sum() <= 1;
 }
@@ -399,13 +401,15 @@ bool is_clear_of(const Particle& particle, const Vec3* points, int count) {
   Vec3 simplex[4];
   int size = 0;
   Vec3 d = particle.x - points[0];
+  SurfacePoint where;
   for (int k = 0; k < kApartSteps; ++k) {
     if (!(d.norm() > kRoundoff * particle.scale * particle.shape->bounding_radius)) return false;
     d.normalize();
-    const Vec3* far = std::max_element(
-        points, points + count, [&](const Vec3& p, const Vec3& q) { return d.dot(p) < d.dot(q); });
-    const FeatureGap g = gap_along(particle, *far, d, nullptr);
+    const Vec3* far = std::max_element(points, points + count,
+                                       [&](const Vec3& p, const Vec3& q) { return d.dot(p) < d.dot(q); });
+    const FeatureGap g = gap_along(particle, *far, d, k > 0 ? &where : nullptr);
     if (g.gap > 0) return true;
+    where = g.where;
     simplex[size++] = particle.x - *far + g.on_body;
     d = nearest_to_origin(simplex, &size);
     if (size == 4) return false;
@@ -434,7 +438,8 @@ FeatureContact find_way_out(const Particle& particle, const Vec3& a, const Conta
 
 FeatureContact find_point_contact(const Particle& particle, const Vec3& a, const Vec3& guess,
                                   const ContactSettings& settings, const SurfacePoint* start) {
-  // A ball of the least curvature radius rolls inside: from no deeper than that, a normal is the shortest way.
+  // A ball of the least curvature radius rolls inside: from no deeper than that, a normal is the shortest
+  // way.
   FeatureContact c;
   if (find_foot(particle, a, guess, start, &c) &&
       (!c.touching || -c.gap <= particle.scale * particle.shape->curvature.min_radius))

@@ -17,13 +17,13 @@ namespace nurbs {
 constexpr double kLineLevel = 1e-9;
 
 struct FeatureContact {
-  bool touching = false;        // else nothing below means anything, but for points
-  double gap = 0;               // < 0
-  Vec3 normal = Vec3::Zero();   // unit d, lab
-  Vec3 on_body = Vec3::Zero();  // the body's deepest point, relative to its centre of mass, lab axes
-  double along = 0;             // place of it on the line, from `a`
+  bool touching = false;                 // else nothing below means anything, but for points
+  double gap = 0;                        // < 0
+  Vec3 normal = Vec3::Zero();            // unit d, lab
+  Vec3 on_body = Vec3::Zero();           // the body's deepest point, relative to its centre of mass, lab axes
+  double along = 0;                      // place of it on the line, from `a`
   double along_low = 0, along_high = 0;  // of all points as deep (find_highest_line_contact)
-  SurfacePoint where;           // the body's surface point, to start from next time
+  SurfacePoint where;                    // the body's surface point, to start from next time
 };
 
 // A line through `a` with unit `direction`. `low` and `high` are unit, square to the line and less than half

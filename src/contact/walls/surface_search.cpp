@@ -580,6 +580,12 @@ class SurfaceSearch {
     return false;
   }
 
+  // Whether the body meets a piece of a line: it may meet the line beyond, and be deepest over the piece.
+  bool meets(const Vec3& a, const Vec3& direction, double low, double high) const {
+    const Vec3 ends[2] = {a + low * direction, a + high * direction};
+    return !is_clear_of(particle_, ends, 2);
+  }
+
   // An edge that stands out, with those that go straight on from it.
   void touch_outer_edge(int number, const Arc& arc, bool active) {
     const MeshPatch::Edge& e = patch_.edges()[number];
@@ -595,7 +601,8 @@ class SurfaceSearch {
     };
     say(MetEdge::unknown);
     const Vec3 apart = particle_.x - a;
-    if ((apart - std::clamp(apart.dot(e.direction), low, high) * e.direction).squaredNorm() > radius_ * radius_)
+    if ((apart - std::clamp(apart.dot(e.direction), low, high) * e.direction).squaredNorm() >
+        radius_ * radius_)
       return say(MetEdge::clear);
     const SurfaceContact* beside[2] = {nullptr, nullptr};
     bool free = active;  // no face of it has the body
@@ -635,11 +642,12 @@ class SurfaceSearch {
     const int end = angle <= 0 ? 0 : angle >= arc.span ? 1 : -1;
     ActivePlane* face = end >= 0 && end < e.sides ? &planes_[plane_of(e, end)] : nullptr;
     const int opposite = face && e.sides == 2 ? instead_of(planes_[plane_of(e, 1 - end)].contact) : -1;
-    const bool lies = face && face->active && !(opposite >= 0 && out_.contact[opposite].gap > f.gap) && instead_of(face->contact) < 0 && face->normal.dot(f.normal) > kSamePlane &&
+    const bool lies = face && face->active && !(opposite >= 0 && out_.contact[opposite].gap > f.gap) &&
+                      instead_of(face->contact) < 0 && face->normal.dot(f.normal) > kSamePlane &&
                       (std::abs(into(e, end).dot(apart + f.on_body)) < kWithin * radius_ ||
                        is_over(plane_of(e, end), particle_.x + f.on_body));
     if ((end < 0 || lies) && owner >= 0 && deeper(beside[0], f.gap) && deeper(beside[1], f.gap) &&
-        !(e.sides == 1 && covered(f, patch_.side(e.first_side).cell))) {
+        !(e.sides == 1 && covered(f, patch_.side(e.first_side).cell)) && meets(a, e.direction, low, high)) {
       edges_[owner].state = MetEdge::along;
       const MeshPatch::Edge& o = patch_.edges()[owner];
       const auto triangle = [&](int i) {
@@ -712,7 +720,7 @@ class SurfaceSearch {
       if (!is_normal(f.normal)) f = find_way_out(particle_, v.x, settings_);
       if (is_normal(f.normal)) most = kFarAway;
     }
-    const bool out = f.touching && is_normal(f.normal) && f.gap > most;
+    const bool out = f.touching && is_normal(f.normal) && f.gap > most + kWithin * radius_;
     if (out) most = f.gap;
     int best = -1;
     if (out) {
@@ -777,18 +785,6 @@ class SurfaceSearch {
     return f;
   }
 
-  // Whether the body does not meet the line of an edge.
-  bool passes_by(const MeshPatch::Edge& e) const {
-    const Vec3 low = e.direction.unitOrthogonal(), side = e.direction.cross(low);
-    double angle;
-    for (const Vec3& towards : {side, Vec3(-side)})
-      if (!find_highest_line_contact(particle_, patch_.vertices()[e.v[0]].x, e.direction,
-                                     {low, towards, M_PI}, nullptr, &angle)
-               .touching)
-        return true;
-    return false;
-  }
-
   FeatureContact at_plane(const ActivePlane& met) const {
     FeatureContact f;
     f.touching = true;
@@ -836,10 +832,6 @@ class SurfaceSearch {
     Range r;
     SurfacePoint start;
     const bool smooth = range(e, &r);
-    if (!smooth && passes_by(e)) {
-      edges_[number].state = MetEdge::clear;
-      return;
-    }
     const FeatureContact f =
         smooth ? find_line_contact(particle_, a, e.direction, r.low, r.high, 0, point_for(r.low, &start))
                : pointed(e);
@@ -850,6 +842,7 @@ class SurfaceSearch {
                                         : MetEdge::along;
     if (met.state != MetEdge::along) return;
     if (e.sides == 1 && covered(f, patch_.side(e.first_side).cell)) return;
+    if (finds_sharp(deepest) && !meets(a, e.direction, 0, e.length)) return;
     const auto triangle = [&](int i) { return patch_.cells()[patch_.side(e.first_side + i).cell].triangle; };
     add_feature(f, weight, triangle(0), smooth ? SurfaceContact::edge : SurfaceContact::under_edge,
                 triangle(0), e.sides > 1 ? triangle(1) : -1);
@@ -892,8 +885,8 @@ class SurfaceSearch {
     for (int i = 0; i < v.edges; ++i)
       if (state(patch_.edge_at(v.first_edge + i)) == MetEdge::clear) return;
     SurfacePoint start;
-    const FeatureContact f =
-        find_point_contact(particle_, v.x, shallowest->normal, settings_, point_for(shallowest->normal, &start));
+    const FeatureContact f = find_point_contact(particle_, v.x, shallowest->normal, settings_,
+                                                point_for(shallowest->normal, &start));
     if (!f.touching) return;
     int weight = 1;
     for (int i = 0; i < v.edges; ++i) {
@@ -969,9 +962,9 @@ class SurfaceSearch {
   static constexpr double kNearVertex = 4;  // overlaps
   static constexpr double kOneSide = 1e-9;  // rad
   static constexpr double kStanding = 0.5;
-  static constexpr double kLineLength = 1e-4;  // of the bounding radius: of a point there is less
+  static constexpr double kLineLength = 1e-4;       // of the bounding radius: of a point there is less
   static constexpr double kStraightOn = 1 - 1e-12;  // cosine
-  static constexpr double kWithin = 1e-9;  // of the bounding radius: on a cell
+  static constexpr double kWithin = 1e-9;           // of the bounding radius: on a cell
 
   const Particle& particle_;
   MeshPatch& patch_;

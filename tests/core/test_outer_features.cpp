@@ -1,0 +1,180 @@
+// Edges and vertices of a mesh that stand out, and borders, against bodies sharper than their overlap is
+// deep: what the search among pieces finds against the pair search with the same polyhedron as a body, which
+// knows no pieces.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "contact/pair_search.h"
+#include "contact/walls/surface_search.h"
+#include "nurbs/bezier_patch.h"
+#include "shapes/primitives.h"
+#include "shapes/revolved.h"
+#include "shapes/rounded_polyhedron.h"
+#include "support/random.h"
+#include "support/solids.h"
+
+namespace nurbs {
+namespace {
+
+using test::Random;
+
+constexpr double kSize = 3;  // of the walls, as scale
+
+struct Wall {
+  std::shared_ptr<const Shape> shape;
+  std::vector<Triangle> triangles;
+  double thickness = 0;  // of the body that stands for it
+};
+
+// The corners of bilinear patches, cut n times n.
+void cut(const Shape& shape, int n, std::vector<Triangle>* out) {
+  for (const BezierPatch& p : shape.patches) {
+    const auto at = [&](int i, int j) -> Vec3 { return kSize * evaluate0(p, double(i) / n, double(j) / n); };
+    const auto add = [&](const Vec3& a, const Vec3& b, const Vec3& c) {
+      if ((b - a).cross(c - a).norm() > 1e-9) out->push_back({a, b, c});
+    };
+    for (int i = 0; i < n; ++i)
+      for (int j = 0; j < n; ++j) {
+        add(at(i, j), at(i + 1, j), at(i + 1, j + 1));
+        add(at(i, j), at(i + 1, j + 1), at(i, j + 1));
+      }
+  }
+}
+
+Wall cube(int n) {
+  Wall w;
+  w.shape = make_shape("cube", box(Vec3::Ones()));
+  cut(*w.shape, n, &w.triangles);
+  return w;
+}
+Wall polyhedron(Random& random) {
+  Wall w;
+  w.shape = test::polyhedron(random, random.whole(4, 10), 1).shape;
+  cut(*w.shape, 1, &w.triangles);
+  return w;
+}
+Wall plate() {
+  Wall w;
+  w.thickness = 1e-5 * kSize;
+  w.shape = make_shape("plate", box(Vec3(1, 1, 1e-5)));
+  const Vec3 a(-kSize, -kSize, 0), b(kSize, -kSize, 0), c(kSize, kSize, 0), d(-kSize, kSize, 0);
+  w.triangles = {{a, b, c}, {a, c, d}};
+  return w;
+}
+
+std::vector<std::pair<std::string, std::shared_ptr<const Shape>>> bodies(Random& random) {
+  return {{"box", make_shape("box", box(Vec3(1, 0.8, 0.6)))},
+          {"tetrahedron", test::polyhedron(random, 4, 1).shape},
+          {"polyhedron", test::polyhedron(random, 7, 1).shape},
+          {"cone", test::cone(random, 1, 1).shape},
+          {"cylinder", test::cylinder(random, 1, 0.6).shape},
+          {"lens", test::lens(random, 1.5).shape},
+          {"frustum", test::frustum(random, 1, 0.5, 0.8).shape},
+          {"capsule", test::capsule(random, 0.6, 0.6).shape},
+          {"rounded box", make_shape("rounded box", rounded_box(Vec3(1, 0.8, 0.6), 0.05))},
+          {"pancake", make_shape("pancake", exact_ellipsoid(Vec3(1, 0.8, 0.15)))},
+          {"tablet", make_shape("tablet", tablet(1, 0.6, 0.1))}};
+}
+
+// A body near a face, an edge or a corner of a wall, whose gap to it is `gap` bounding radii.
+Particle place(Random& random, const Shape& shape, const Wall& wall, int near, double gap,
+               ContactResult* truth) {
+  Particle body, other;
+  body.shape = &shape;
+  body.scale = random.log_uniform(0.3, 1);
+  body.q = random.below(8) ? random.turn() : Quat::Identity();
+  other.shape = wall.shape.get();
+  other.scale = kSize;
+  const double radius = body.scale * shape.bounding_radius;
+  const Triangle& t = wall.triangles[random.below(static_cast<int>(wall.triangles.size()))];
+  const double share = random.uniform(0, 1);
+  const Vec3 towards = near == 0 ? random.direction()
+                       : near == 1
+                           ? Vec3((1 - share) * t[0] + share * t[1] + 0.1 * radius * random.direction())
+                           : Vec3(t[0] + 0.3 * radius * random.direction());
+  const Vec3 u = towards.normalized();
+  double low = 0, high = 4 * kSize;
+  for (int k = 0; k < 20; ++k) {
+    body.x = 0.5 * (low + high) * u;
+    PairMemory memory{};
+    *truth = find_contact(body, other, {}, reinterpret_cast<double*>(&memory));
+    (truth->gap < gap * radius ? low : high) = 0.5 * (low + high);
+  }
+  EXPECT_LT(std::abs(truth->gap - gap * radius), 0.2 * std::abs(gap) * radius);
+  return body;
+}
+
+SurfaceContacts contacts(const Particle& body, const std::vector<Triangle>& triangles) {
+  MeshPatch patch;
+  patch.build(triangles.data(), static_cast<int>(triangles.size()), 1e-9);
+  SurfaceContacts found;
+  find_surface_contacts(body, patch, {}, 0, nullptr, 0, &found);
+  return found;
+}
+
+// Of `count` all but `off` right. (The way out of a border's corner may be the second shortest of the body.)
+void compare(const Wall& wall, int count, int off, std::uint64_t seed) {
+  Random random(seed);
+  const auto list = bodies(random);
+  int wrong = 0;
+  for (int k = 0; k < count; ++k) {
+    const auto& [name, shape] = list[k % list.size()];
+    ContactResult truth;
+    const Particle body = place(random, *shape, wall, k % 3, -1e-3, &truth);
+    const double radius = body.scale * shape->bounding_radius;
+    const SurfaceContacts found = contacts(body, wall.triangles);
+    ASSERT_EQ(found.count, 1) << name << " " << k;
+    const double error = std::abs(found.contact[0].gap - truth.gap);
+    EXPECT_LT(error, 1e-3 * radius) << name << " " << k;
+    wrong += error > 1e-6 * radius + 3 * wall.thickness;
+  }
+  EXPECT_LE(wrong, off);
+}
+
+TEST(OuterFeatures, a_cube_is_met_as_by_a_body) {
+  compare(cube(1), 880, 0, 1);
+}
+
+TEST(OuterFeatures, a_plate_is_met_as_by_a_body) {
+  compare(plate(), 880, 1, 2);
+}
+
+TEST(OuterFeatures, bodies_apart_have_no_contact) {
+  Random random(3);
+  const auto list = bodies(random);
+  std::vector<Wall> walls = {cube(1), plate()};
+  for (int k = 0; k < 4; ++k) walls.push_back(polyhedron(random));
+  for (int k = 0; k < 1650; ++k) {
+    const auto& [name, shape] = list[k % list.size()];
+    const Wall& wall = walls[random.below(static_cast<int>(walls.size()))];
+    ContactResult truth;
+    const Particle body = place(random, *shape, wall, k % 3, 1e-3, &truth);
+    EXPECT_EQ(contacts(body, wall.triangles).count, 0) << name << " " << k;
+  }
+}
+
+TEST(OuterFeatures, cuts_of_faces_and_edges_change_nothing) {
+  Random random(4);
+  const auto list = bodies(random);
+  const Wall coarse = cube(1), fine = cube(7);
+  for (int k = 0; k < 660; ++k) {
+    const auto& [name, shape] = list[k % list.size()];
+    ContactResult truth;
+    const Particle body = place(random, *shape, coarse, k % 3, -1e-3, &truth);
+    const SurfaceContacts one = contacts(body, coarse.triangles), other = contacts(body, fine.triangles);
+    ASSERT_EQ(one.count, other.count) << name << " " << k;
+    for (int i = 0; i < one.count; ++i) {
+      const double radius = body.scale * shape->bounding_radius;
+      EXPECT_NEAR(one.contact[i].gap, other.contact[i].gap, 1e-9 * radius) << name << " " << k;
+      EXPECT_LT((one.contact[i].normal - other.contact[i].normal).norm(), 1e-6) << name << " " << k;
+    }
+  }
+}
+
+}  // namespace
+}  // namespace nurbs
