@@ -62,11 +62,14 @@ TEST(GrowingHull, foot_of_a_needle) {
     Vec3 corner[3] = {Vec3(-1, -in, off), Vec3(1, -in, off), Vec3(at, height - in, off)};
     const double between = in / height;
     if (!(std::abs(at * between) < 1 - between)) continue;
-    for (Vec3& x : corner) x = turn * x;
+    auto hull = std::make_unique<GrowingHull>(kSliverHeight);
     const int first = random.below(3);
-    const Vec3 &a = corner[first], &b = corner[(first + 1) % 3], &c = corner[(first + 2) % 3];
-    const Vec3 w = nearest_on_triangle(a, b, c);
-    EXPECT_NEAR((w[0] * a + w[1] * b + w[2] * c).norm(), off, 1e-15 + 2e-3 * off) << k;
+    for (int i = 0; i < 3; ++i) hull->store(turn * corner[(first + i) % 3]);
+    hull->store(turn * Vec3(0, 0, 5));
+    ASSERT_TRUE(hull->start(0, 1, 2, 3));
+    const GrowingHull::Nearest near = hull->nearest();
+    EXPECT_FALSE(near.inside) << k;
+    EXPECT_NEAR(std::sqrt(near.distance2), off, 1e-15 + 2e-3 * off) << k;
   }
 }
 

@@ -8,6 +8,7 @@
 namespace nurbs {
 namespace {
 
+constexpr double kNeedle = 1e-3;   // height over length
 constexpr double kFootNoise = 64;  // round-offs of the furthest corner, between a plane and its foot
 
 int count_positive(const Vec3& w) {
@@ -32,6 +33,11 @@ struct Edges {
     return lca >= lab ? ab.cross(bc) : bc.cross(ca);
   }
   double longest2() const { return std::max({lab, lbc, lca}); }
+  // Of a needle, square to its longest side to round-off: the corners may be far from where that matters.
+  Vec3 upright(const Vec3& n) const {
+    const Vec3& side = lab >= lbc && lab >= lca ? ab : lbc >= lca ? bc : ca;
+    return n - n.dot(side) / longest2() * side;
+  }
 };
 
 }  // namespace
@@ -101,8 +107,6 @@ Vec3 nearest_on_triangle(const Vec3& a, const Vec3& b, const Vec3& c) {
   }
   const double sum = wp + wq + wr;
   if (!(sum > 0)) return w;
-  const Vec3 settled = foot_weights(a, b, c);
-  if (settled.minCoeff() > 0) return settled;
   w[i] = wp / sum;
   w[j] = wq / sum;
   w[k] = wr / sum;
@@ -130,6 +134,8 @@ void GrowingHull::set(int f, int a, int b, int c) {
     face.normal.setZero();
   else
     face.normal = 1 / std::sqrt(area2) * m;
+  if (!face.sliver && area2 < kNeedle * kNeedle * edges.longest2() * edges.longest2())
+    face.normal = edges.upright(face.normal).normalized();
   face.offset = std::min({face.normal.dot(p), face.normal.dot(q), face.normal.dot(r)});
   behind_ += face.offset < 0;
   foot_[f] = false;
@@ -152,6 +158,14 @@ void GrowingHull::find_foot(int f) {
     make_sliver(face);
   }
   distance2_[f] = nearest_point(face).squaredNorm();
+  if (face.sliver) return;
+  // Of a needle even the edge that the foot is beyond may be taken wrongly.
+  const Vec3 w = foot_weights(point_[face.vertex[0]], point_[face.vertex[1]], point_[face.vertex[2]]);
+  const Vec3 x =
+      w[0] * point_[face.vertex[0]] + w[1] * point_[face.vertex[1]] + w[2] * point_[face.vertex[2]];
+  if (!(w.minCoeff() > 0) || !(x.squaredNorm() < distance2_[f])) return;
+  face.weights = w;
+  distance2_[f] = x.squaredNorm();
 }
 
 // Whether a triangle has its plane's foot where its weights say, those settled once if need be: of a needle
@@ -165,9 +179,12 @@ bool GrowingHull::holds_foot(Face& face) const {
   const double qq = pq.squaredNorm(), rr = pr.squaredNorm(), qr = pq.dot(pr), det = qq * rr - qr * qr,
                xq = x.dot(pq), xr = x.dot(pr), dq = (qr * xr - rr * xq) / det, dr = (qr * xq - qq * xr) / det;
   const Vec3 settled = face.weights + Vec3(-dq - dr, dq, dr);
-  if (!(settled.minCoeff() > 0)) return false;
-  face.weights = settled / settled.sum();
-  return nearest_point(face).squaredNorm() <= most * most;
+  for (const Vec3& w : {Vec3(settled / settled.sum()), foot_weights(p, q, r)}) {
+    if (!(w.minCoeff() > 0)) continue;
+    face.weights = w;
+    if (nearest_point(face).squaredNorm() <= most * most) return true;
+  }
+  return false;
 }
 
 void GrowingHull::make_sliver(Face& face) {
