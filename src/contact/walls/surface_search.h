@@ -18,12 +18,12 @@
 // Contacts with a negative weight take that back, and a body rolling in a faceted trough feels one surface. A
 // sharp valley gives two contacts, as its bottom line does not touch.
 //
-// A body sharper than its overlap with a plane is deep has several maxima over directions: a face may have its
-// deepest point, behind the plane by all its size and over the border by next to nothing, or not meet it at
-// all. At edges that stand out towards the body, and borders, the contact is then the highest of all maxima
-// over the normals that the wall has there, from one face's to the other's; at vertices all of whose edges do,
-// the shortest way out in any direction, if it is a normal of the wall. Contacts of the pieces beside that are
-// deeper are left out, and so are those of faces and edges that the body is clear of (GJK).
+// A body sharper than its overlap with a plane is deep has several maxima over directions: a face may have
+// its deepest point, behind the plane by all its size and over the border by next to nothing, or not meet it
+// at all. At edges that stand out towards the body, and borders, the contact is then the highest of all
+// maxima over the normals that the wall has there, from one face's to the other's; at vertices all of whose
+// edges do, the shortest way out in any direction, if it is a normal of the wall. Contacts of the pieces
+// beside that are deeper are left out, and so are those of faces and edges that the body is clear of (GJK).
 #pragma once
 
 #include "contact/pair_memory.h"

@@ -1,0 +1,226 @@
+// Edges and vertices of a mesh as far as the index of the height there counts (surface_search.h).
+#include <algorithm>
+#include <cmath>
+
+#include "contact/walls/surface_pieces.h"
+#include "nurbs/tolerances.h"
+
+namespace nurbs {
+
+bool SurfaceSearch::range(const MeshPatch::Edge& e, Range* r) const {
+  const Vec3 a = patch_.vertices()[e.v[0]].x;
+  const ActivePlane& first = planes_[patch_.cells()[patch_.side(e.first_side).cell].plane];
+  double low = -kFarAway, high = kFarAway;
+  for (int i = e.first_side; i < e.first_side + e.sides; ++i) {
+    const ActivePlane& met = planes_[patch_.cells()[patch_.side(i).cell].plane];
+    const double angle =
+        std::atan2(e.direction.dot(first.normal.cross(met.normal)), first.normal.dot(met.normal));
+    const double slope = e.direction.cross(met.normal).dot(particle_.x - a + met.deepest);
+    if (slope > 0) {
+      if (angle > low) low = angle, r->low = met.normal;
+    } else if (angle < high) {
+      high = angle;
+      r->high = met.normal;
+    }
+  }
+  if (low > -kFarAway && high < kFarAway) return high >= low;
+  // A border: the direction turns outward, to the side at most.
+  if (low > -kFarAway)
+    r->high = e.direction.cross(r->low);
+  else
+    r->low = -e.direction.cross(r->high);
+  return true;
+}
+
+int SurfaceSearch::first_plane_of(const MeshPatch::Vertex& v) const {
+  return patch_.cells()[patch_.cell_at(v.first_cell)].plane;
+}
+
+// A corner of the body sharper than its overlap is deep: f has no maximum between the planes, and the
+// shallower one takes over at once.
+FeatureContact SurfaceSearch::pointed(const MeshPatch::Edge& e) const {
+  const ActivePlane* shallowest = nullptr;
+  for (int i = e.first_side; i < e.first_side + e.sides; ++i) {
+    const ActivePlane& met = planes_[patch_.cells()[patch_.side(i).cell].plane];
+    if (!shallowest || met.result.gap > shallowest->result.gap) shallowest = &met;
+  }
+  FeatureContact f = at_plane(*shallowest);
+  f.along = e.direction.dot(particle_.x + f.on_body - patch_.vertices()[e.v[0]].x);
+  return f;
+}
+
+FeatureContact SurfaceSearch::at_plane(const ActivePlane& met) const {
+  FeatureContact f;
+  f.touching = true;
+  f.gap = met.result.gap;
+  f.normal = met.normal;
+  f.on_body = met.deepest;
+  f.where = warm_point(met.memory.on_b, *particle_.shape);
+  return f;
+}
+
+bool SurfaceSearch::all_open(const MeshPatch::Edge& e) const {
+  for (int i = e.first_side; i < e.first_side + e.sides; ++i) {
+    const ActivePlane& met = planes_[patch_.cells()[patch_.side(i).cell].plane];
+    if (!met.active || met.claimed) return false;
+  }
+  return true;
+}
+
+void SurfaceSearch::touch_edge(int number) {
+  const MeshPatch::Edge& e = patch_.edges()[number];
+  if (e.inner) return;
+  double deepest = 0;
+  bool active = true;
+  for (int i = 0; i < e.sides; ++i) {
+    const ActivePlane& met = planes_[plane_of(e, i)];
+    active = active && met.active;
+    if (met.active) deepest = std::min(deepest, met.result.gap);
+  }
+  edges_[number].state = MetEdge::unknown;
+  Arc arc;
+  if (finds_sharp(deepest) && outer_arc(e, &arc)) return touch_outer_edge(number, arc, active);
+  if (!all_open(e)) return;
+  int weight = 1;
+  for (int i = e.first_side; i < e.first_side + e.sides; ++i) {
+    const MeshPatch::Side& side = patch_.side(i);
+    const int plane = patch_.cells()[side.cell].plane;
+    if (side.sign * inside(planes_[plane], patch_.planes()[plane], e) > 0) --weight;
+  }
+  if (weight == 0) return;
+  const Vec3& a = patch_.vertices()[e.v[0]].x;
+  if (from_edge(patch_, e, particle_.x).squaredNorm() > radius_ * radius_) {
+    edges_[number].state = MetEdge::clear;
+    return;
+  }
+  Range r;
+  SurfacePoint start;
+  const bool smooth = range(e, &r);
+  const FeatureContact f =
+      smooth ? find_line_contact(particle_, a, e.direction, r.low, r.high, 0, point_for(r.low, &start))
+             : pointed(e);
+  MetEdge& met = edges_[number];
+  met.state = !f.touching             ? MetEdge::clear
+              : !(f.along > 0)        ? MetEdge::before
+              : !(f.along < e.length) ? MetEdge::beyond
+                                      : MetEdge::along;
+  if (met.state != MetEdge::along) return;
+  if (e.sides == 1 && covered(f, patch_.side(e.first_side).cell)) return;
+  if (finds_sharp(deepest) && !meets(a, e.direction, 0, e.length)) return;
+  const auto triangle = [&](int i) { return patch_.cells()[patch_.side(e.first_side + i).cell].triangle; };
+  add_feature(f, weight, triangle(0), smooth ? SurfaceContact::edge : SurfaceContact::under_edge, triangle(0),
+              e.sides > 1 ? triangle(1) : -1);
+}
+
+// Whether a point of a border lies within another cell: meshes that overlap themselves have no border
+// there.
+bool SurfaceSearch::covered(const FeatureContact& f, int own) const {
+  const Vec3 y = particle_.x + f.on_body - f.gap * f.normal;
+  for (std::size_t c = 0; c < patch_.cells().size(); ++c) {
+    const MeshPatch::Cell& cell = patch_.cells()[c];
+    if (static_cast<int>(c) == own || !planes_[cell.plane].active) continue;
+    const MeshPatch::Plane& plane = patch_.planes()[cell.plane];
+    if (std::abs(plane.normal.dot(y - plane.origin)) > kWithin * radius_) continue;
+    if (in_cell(cell, y)) return true;
+  }
+  return false;
+}
+
+void SurfaceSearch::touch_vertex(int number) {
+  const MeshPatch::Vertex& v = patch_.vertices()[number];
+  if (v.inner || v.cells == 0) return;
+  if ((particle_.x - v.x).squaredNorm() > radius_ * radius_) return;
+  const ActivePlane* shallowest = nullptr;
+  bool claimed = false;
+  double deepest = 0;
+  for (int i = 0; i < v.cells; ++i) {
+    const int plane = patch_.cells()[patch_.cell_at(v.first_cell + i)].plane;
+    const ActivePlane& met = planes_[plane];
+    if (!met.active) return;
+    claimed = claimed || met.claimed;
+    deepest = std::min(deepest, met.result.gap);
+    if (!shallowest || met.result.gap > shallowest->result.gap) shallowest = &met;
+  }
+  if (finds_sharp(deepest) && touch_outer_vertex(number, shallowest->normal)) return;
+  if (claimed) return;
+  if (edged(*particle_.shape) && lies_under(number))
+    return add_feature(at_plane(*shallowest), 1, patch_.cells()[patch_.cell_at(v.first_cell)].triangle,
+                       SurfaceContact::under_vertex, v.triangle, v.corner);
+  for (int i = 0; i < v.edges; ++i)
+    if (state(patch_.edge_at(v.first_edge + i)) == MetEdge::clear) return;
+  SurfacePoint start;
+  const FeatureContact f = find_point_contact(particle_, v.x, shallowest->normal, settings_,
+                                              point_for(shallowest->normal, &start));
+  if (!f.touching) return;
+  int weight = 1;
+  for (int i = 0; i < v.edges; ++i) {
+    const int e = patch_.edge_at(v.first_edge + i);
+    if (climbs(e, number, f.normal)) weight -= 1 - patch_.edges()[e].sides;
+  }
+  for (int i = 0; i < v.cells; ++i)
+    if (cell_climbs(patch_.cell_at(v.first_cell + i), number, f.normal)) --weight;
+  if (weight == 0) return;
+  add_feature(f, weight, patch_.cells()[patch_.cell_at(v.first_cell)].triangle, SurfaceContact::vertex,
+              v.triangle, v.corner);
+}
+
+// Whether a corner of the body is in a pit below a vertex: beyond the ends of all its edges, so that no
+// triangle or edge has it.
+bool SurfaceSearch::lies_under(int number) const {
+  const MeshPatch::Vertex& v = patch_.vertices()[number];
+  for (int i = 0; i < v.edges; ++i) {
+    const MeshPatch::Edge& e = patch_.edges()[patch_.edge_at(v.first_edge + i)];
+    if (e.sides < 2) return false;
+    const Vec3 away = e.v[0] == number ? e.direction : Vec3(-e.direction);
+    for (int k = 0; k < v.cells; ++k) {
+      const ActivePlane& met = planes_[patch_.cells()[patch_.cell_at(v.first_cell + k)].plane];
+      if (away.dot(particle_.x + met.deepest - v.x) > 0) return false;
+    }
+  }
+  return true;
+}
+
+// Edges within a plane are not met.
+MetEdge::State SurfaceSearch::state(int edge) const {
+  return patch_.edges()[edge].inner ? MetEdge::unknown : edges_[edge].state;
+}
+
+// Whether an edge climbs along d from its end at a vertex; by where the body met the edge, if it did.
+bool SurfaceSearch::climbs(int edge, int vertex, const Vec3& d) const {
+  const MeshPatch::Edge& e = patch_.edges()[edge];
+  const bool first = e.v[0] == vertex;
+  switch (state(edge)) {
+    case MetEdge::along:
+      return true;
+    case MetEdge::before:
+      return !first;
+    case MetEdge::beyond:
+      return first;
+    default:
+      return (first ? 1 : -1) * e.direction.dot(d) > 0;
+  }
+}
+
+bool SurfaceSearch::cell_climbs(int number, int vertex, const Vec3& d) const {
+  const MeshPatch::Cell& cell = patch_.cells()[number];
+  for (int k = 0; k < cell.corners; ++k) {
+    if (patch_.corner(cell.first + k) != vertex) continue;
+    const int before = patch_.edge_of(cell.first + (k + cell.corners - 1) % cell.corners);
+    return climbs(patch_.edge_of(cell.first + k), vertex, d) || climbs(before, vertex, d);
+  }
+  return false;
+}
+
+void SurfaceSearch::add_feature(const FeatureContact& f, int weight, int triangle,
+                                SurfaceContact::Piece piece, int first, int second) {
+  const Shape& shape = *particle_.shape;
+  if (weight < 0 && edged(shape) && -f.gap > kBluntest * particle_.scale * shape.curvature.min_radius) return;
+  SurfaceContact c = surface_contact(f, triangle);
+  c.weight = weight;
+  c.piece = piece;
+  c.of[0] = first;
+  c.of[1] = second;
+  add(c);
+}
+
+}  // namespace nurbs

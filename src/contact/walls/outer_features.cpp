@@ -1,0 +1,328 @@
+// Edges and vertices that stand out, against bodies sharper than their overlap with a plane is deep. There
+// the heights have several maxima, and a face may have the deepest point of a body that is behind its plane
+// by all its size and over its border by next to nothing. The wall about a convex edge or vertex is a wedge
+// or a cone, and the way out of it is the shortest along any normal that it has there. A contact with a piece
+// of it that is deeper than that is none.
+#include <algorithm>
+#include <cmath>
+
+#include "contact/walls/surface_pieces.h"
+#include "nurbs/tolerances.h"
+
+namespace nurbs {
+
+// Whether a body is too sharp for its overlap with the planes to have one maximum over directions.
+bool SurfaceSearch::finds_sharp(double gap) const {
+  const Shape& shape = *particle_.shape;
+  return edged(shape) || -gap > kBluntest * particle_.scale * shape.curvature.min_radius;
+}
+
+SurfaceSearch::Cone SurfaceSearch::cone_at(int number) const {
+  const MeshPatch::Vertex& v = patch_.vertices()[number];
+  bool outside = false;
+  for (int i = 0; i < v.cells; ++i) {
+    const Vec3& n = patch_.planes()[patch_.cells()[patch_.cell_at(v.first_cell + i)].plane].normal;
+    double low = 0, high = 0;
+    for (int k = 0; k < v.edges; ++k) {
+      const MeshPatch::Edge& e = patch_.edges()[patch_.edge_at(v.first_edge + k)];
+      if (e.sides != 2) return Cone::other;
+      const double height = (e.v[0] == number ? 1 : -1) * n.dot(e.direction);
+      low = std::min(low, height);
+      high = std::max(high, height);
+    }
+    if (std::min(-low, high) > kOneSide) return Cone::other;
+    const double off = n.dot(particle_.x - v.x);
+    outside = outside || (high > -low ? off < 0 : off > 0);
+  }
+  return outside ? Cone::outside : Cone::around;
+}
+
+// The normals of the wall at an edge that stands out towards the body: from one face's to the other's,
+// whatever side of the planes the body's centre is on; at a border, the half turn from one side to the
+// other. False at an edge that does not.
+bool SurfaceSearch::outer_arc(const MeshPatch::Edge& e, Arc* arc) const {
+  if (e.inner || e.sides > 2) return false;
+  Vec3 inward[2], normal[2];
+  for (int i = 0; i < e.sides; ++i) {
+    normal[i] = patch_.planes()[plane_of(e, i)].normal;
+    inward[i] = into(e, i);
+  }
+  const Vec3 off = particle_.x - patch_.vertices()[e.v[0]].x;
+  if (e.sides == 1) {
+    if (normal[0].dot(off) < 0) normal[0] = -normal[0];
+    *arc = {normal[0], -inward[0], M_PI};
+    return true;
+  }
+  // The body is between the faces if its centre is on the other's side of each; where the centre is beyond
+  // an end, the vertex there knows better.
+  const double along = e.direction.dot(off);
+  const Cone cone = along < 0 ? cone_at(e.v[0]) : along > e.length ? cone_at(e.v[1]) : Cone::other;
+  if (cone == Cone::around) return false;
+  const double across = inward[0].cross(inward[1]).dot(e.direction);
+  if (cone == Cone::other && inward[0].cross(off).dot(e.direction) * across >= 0 &&
+      off.cross(inward[1]).dot(e.direction) * across >= 0)
+    return false;
+  for (int i = 0; i < 2; ++i)
+    if (inward[1 - i].dot(normal[i]) > 0) normal[i] = -normal[i];
+  const double cosine = normal[0].dot(normal[1]);
+  const Vec3 side = normal[1] - cosine * normal[0];
+  if (!(side.norm() > 1e-12)) return false;
+  *arc = {normal[0], side.normalized(), std::atan2(normal[0].cross(normal[1]).norm(), cosine)};
+  return true;
+}
+
+int SurfaceSearch::plane_of(const MeshPatch::Edge& e, int side) const {
+  return patch_.cells()[patch_.side(e.first_side + side).cell].plane;
+}
+
+// The contact of a piece, unless there is none or it was dropped.
+const SurfaceContact* SurfaceSearch::kept(int contact) const {
+  return contact < 0 || dropped_[contact] ? nullptr : &out_.contact[contact];
+}
+
+Vec3 SurfaceSearch::on_wall(const SurfaceContact& c) const {
+  return particle_.x + c.on_body - c.gap * c.normal;
+}
+
+// From an edge into the cell of a side of it.
+Vec3 SurfaceSearch::into(const MeshPatch::Edge& e, int side) const {
+  const MeshPatch::Side& s = patch_.side(e.first_side + side);
+  return s.sign * patch_.planes()[patch_.cells()[s.cell].plane].normal.cross(e.direction);
+}
+
+// The contact of the plane of an edge's side, if it is where a wedge about the edge has it and the way out
+// of the wedge may be shorter: along a normal of it turned by t, the deepest point of the body, `in` from
+// the edge, is deeper than -gap cos(t) + in sin(t).
+const SurfaceContact* SurfaceSearch::contact_beside(const MeshPatch::Edge& e, int side, const Arc& arc,
+                                                    double low, double high) const {
+  const SurfaceContact* c = kept(planes_[plane_of(e, side)].contact);
+  if (!c) return nullptr;
+  const Vec3 inward = into(e, side), y = on_wall(*c) - patch_.vertices()[e.v[0]].x;
+  const double in = inward.dot(y), along = e.direction.dot(y);
+  if (in < -kWithin * radius_ || along < low + c->gap || along > high - c->gap) return nullptr;
+  const bool behind = e.sides == 2 && c->normal.dot(arc.end(side)) < 0;  // its way out leads into the wall
+  if (!behind && in * std::sin(arc.span) >= -c->gap * (1 - std::cos(arc.span))) return nullptr;
+  return c;
+}
+
+// Leaves a contact out, for another if there is one.
+void SurfaceSearch::drop(const SurfaceContact* c, int other) {
+  if (!c) return;
+  const auto number = c - out_.contact;
+  dropped_[number] = true;
+  instead_[number] = other;
+}
+
+// The one that is kept for a contact, itself if it is; -1 for none.
+int SurfaceSearch::instead_of(int contact) const {
+  while (contact >= 0 && dropped_[contact]) contact = instead_[contact];
+  return contact;
+}
+
+// Whether a contact is deeper than a way out that leaves it out. A flat feature that stands on a plane is
+// not given up for a little.
+bool SurfaceSearch::deeper(const SurfaceContact* c, double gap) {
+  return !c || (c->flat ? kStanding : 1) * c->gap < gap;
+}
+
+// The edges that go on straight from one, between the same planes, as pieces of its line.
+const std::vector<Stretch>& SurfaceSearch::straight_on(int number) {
+  std::vector<Stretch>& line = workspace().line;
+  const MeshPatch::Edge& e = patch_.edges()[number];
+  line.assign(1, {number, 0, e.length});
+  for (const int way : {1, 0}) {
+    int last = number, v = e.v[way];
+    double at = way ? e.length : 0;
+    for (bool found = true; found && line.size() < patch_.edges().size();) {
+      found = false;
+      const MeshPatch::Vertex& vertex = patch_.vertices()[v];
+      for (int i = 0; i < vertex.edges && !found; ++i) {
+        const int next = patch_.edge_at(vertex.first_edge + i);
+        const MeshPatch::Edge& n = patch_.edges()[next];
+        const double sign = (n.v[0] == v ? 1 : -1) * (way ? 1 : -1);
+        found = next != last && !n.inner && sign * n.direction.dot(e.direction) > kStraightOn &&
+                same_planes(n, e);
+        if (!found) continue;
+        const double to = at + (way ? n.length : -n.length);
+        line.push_back({next, std::min(at, to), std::max(at, to)});
+        at = to;
+        v = n.v[n.v[0] == v ? 1 : 0];
+        last = next;
+      }
+    }
+  }
+  return line;
+}
+
+bool SurfaceSearch::same_planes(const MeshPatch::Edge& a, const MeshPatch::Edge& b) const {
+  if (a.sides != b.sides) return false;
+  if (a.sides == 1) return plane_of(a, 0) == plane_of(b, 0);
+  return (plane_of(a, 0) == plane_of(b, 0) && plane_of(a, 1) == plane_of(b, 1)) ||
+         (plane_of(a, 0) == plane_of(b, 1) && plane_of(a, 1) == plane_of(b, 0));
+}
+
+// Whether edges that go straight on meet at a vertex.
+bool SurfaceSearch::is_on_line(int number) const {
+  const MeshPatch::Vertex& v = patch_.vertices()[number];
+  for (int i = 0; i < v.edges; ++i)
+    for (int k = 0; k < i; ++k) {
+      const MeshPatch::Edge &a = patch_.edges()[patch_.edge_at(v.first_edge + i)],
+                            &b = patch_.edges()[patch_.edge_at(v.first_edge + k)];
+      if (!a.inner && !b.inner && std::abs(a.direction.dot(b.direction)) > kStraightOn) return true;
+    }
+  return false;
+}
+
+// Whether the body meets a piece of a line: it may meet the line beyond, and be deepest over the piece.
+bool SurfaceSearch::meets(const Vec3& a, const Vec3& direction, double low, double high) const {
+  const Vec3 ends[2] = {a + low * direction, a + high * direction};
+  return !is_clear_of(particle_, ends, 2);
+}
+
+// An edge that stands out, with those that go straight on from it.
+void SurfaceSearch::touch_outer_edge(int number, const Arc& arc, bool active) {
+  const MeshPatch::Edge& e = patch_.edges()[number];
+  const Vec3& a = patch_.vertices()[e.v[0]].x;
+  const std::vector<Stretch>& line = straight_on(number);
+  double low = 0, high = 0;
+  for (const Stretch& piece : line) {
+    low = std::min(low, piece.from);
+    high = std::max(high, piece.to);
+  }
+  const auto say = [&](MetEdge::State state) {
+    for (const Stretch& piece : line) edges_[piece.edge].state = state;
+  };
+  say(MetEdge::unknown);
+  const Vec3 apart = particle_.x - a;
+  if ((apart - std::clamp(apart.dot(e.direction), low, high) * e.direction).squaredNorm() > radius_ * radius_)
+    return say(MetEdge::clear);
+  const SurfaceContact* beside[2] = {nullptr, nullptr};
+  bool free = active;  // no face of it has the body
+  for (int i = 0; i < e.sides; ++i) {
+    const int p = plane_of(e, i);
+    if (!planes_[p].active) continue;
+    beside[i] = contact_beside(e, i, arc, low, high);
+    if (planes_[p].claimed) free = false;
+    if (patch_.side(e.first_side + i).sign * inside(planes_[p], patch_.planes()[p], e) > 0 &&
+        kept(planes_[p].contact))
+      free = false;
+  }
+  if (!free && !beside[0] && !beside[1]) return;
+  double angle = 0;
+  SurfacePoint start;
+  FeatureContact f =
+      find_highest_line_contact(particle_, a, e.direction, arc, point_for(arc.low, &start), &angle);
+  if (!f.touching) {  // nor are they, whatever their planes say
+    for (const SurfaceContact* c : beside) drop(c);
+    return say(MetEdge::clear);
+  }
+  // Of a line of the body that lies along the edge, the middle of what is over it.
+  if (f.along_low < high && f.along_high > low && f.along_high - f.along_low > kLineLength * radius_) {
+    const double middle = 0.5 * (std::max(f.along_low, low) + std::min(f.along_high, high));
+    f.on_body += (middle - f.along) * e.direction;
+    f.along = middle;
+  }
+  int owner = -1;
+  for (const Stretch& piece : line) {
+    edges_[piece.edge].state = f.along < piece.from ? MetEdge::before : MetEdge::beyond;
+    if (f.along > low && f.along < high && f.along >= piece.from && f.along <= piece.to &&
+        (owner < 0 || piece.edge < owner))
+      owner = piece.edge;
+  }
+  // At an end of the arc a face has it, but for a line of the body that lies along the face: the plane's
+  // deepest point may be its end that is not over the face.
+  const int end = angle <= 0 ? 0 : angle >= arc.span ? 1 : -1;
+  ActivePlane* face = end >= 0 && end < e.sides ? &planes_[plane_of(e, end)] : nullptr;
+  const int opposite = face && e.sides == 2 ? instead_of(planes_[plane_of(e, 1 - end)].contact) : -1;
+  const bool lies = face && face->active && !(opposite >= 0 && out_.contact[opposite].gap > f.gap) &&
+                    instead_of(face->contact) < 0 && face->normal.dot(f.normal) > kSamePlane &&
+                    (std::abs(into(e, end).dot(apart + f.on_body)) < kWithin * radius_ ||
+                     is_over(plane_of(e, end), particle_.x + f.on_body));
+  if ((end < 0 || lies) && owner >= 0 && deeper(beside[0], f.gap) && deeper(beside[1], f.gap) &&
+      !(e.sides == 1 && covered(f, patch_.side(e.first_side).cell)) && meets(a, e.direction, low, high)) {
+    edges_[owner].state = MetEdge::along;
+    const MeshPatch::Edge& o = patch_.edges()[owner];
+    const auto triangle = [&](int i) { return patch_.cells()[patch_.side(o.first_side + i).cell].triangle; };
+    SurfaceContact c = surface_contact(f, triangle(0));
+    c.piece = SurfaceContact::edge;
+    c.of[0] = triangle(0);
+    c.of[1] = o.sides > 1 ? triangle(1) : -1;
+    const int contact = edges_[owner].contact = add(c);
+    for (const SurfaceContact* other : beside) drop(other, contact);
+    if (face) face->contact = contact;
+    return;
+  }
+  // The way out of the one face leads out of the other, if it is shorter.
+  for (int i = 0; i < 2 && e.sides == 2; ++i) {
+    const SurfaceContact* other = beside[1 - i];
+    const int there = instead_of(planes_[plane_of(e, i)].contact);
+    if (other && there >= 0 && kept(there) != other && out_.contact[there].gap > other->gap &&
+        f.gap > other->gap)
+      drop(other, there);
+  }
+}
+
+// A vertex all of whose edges stand out; false where one does not.
+bool SurfaceSearch::touch_outer_vertex(int number, const Vec3& guess) {
+  const MeshPatch::Vertex& v = patch_.vertices()[number];
+  const Cone cone = cone_at(number);
+  if (cone == Cone::around) return false;
+  if (is_on_line(number)) return true;  // a place of an edge, no more
+  Arc arc;
+  for (int i = 0; i < v.edges && cone == Cone::other; ++i) {
+    const MeshPatch::Edge& e = patch_.edges()[patch_.edge_at(v.first_edge + i)];
+    if (!e.inner && !outer_arc(e, &arc)) return false;
+  }
+  // Of its pieces' contacts the shallowest leads out of all of them. Those further away than a few times
+  // their depth have no shorter way out here.
+  const SurfaceContact* near[kSurfaceContacts];
+  int count = 0;
+  bool touched = false;
+  double most = -kFarAway;
+  const auto is_normal = [&](const Vec3& d) {
+    for (int i = 0; i < v.edges; ++i) {
+      const MeshPatch::Edge& e = patch_.edges()[patch_.edge_at(v.first_edge + i)];
+      if ((e.v[0] == number ? 1 : -1) * e.direction.dot(d) > kOneSide) return false;
+    }
+    return true;
+  };
+  const auto offer = [&](int contact) {
+    const SurfaceContact* c = kept(contact);
+    if (!c || std::find(near, near + count, c) != near + count) return;
+    if (is_normal(c->normal)) {
+      touched = true;
+      most = std::max(most, c->gap);
+    }
+    if ((on_wall(*c) - v.x).norm() <= -kNearVertex * c->gap) near[count++] = c;
+  };
+  for (int i = 0; i < v.edges; ++i) {
+    const int e = patch_.edge_at(v.first_edge + i);
+    if (patch_.edges()[e].inner) continue;
+    offer(edges_[e].contact);
+    if (edges_[e].state == MetEdge::clear) return true;
+  }
+  for (int i = 0; i < v.cells; ++i)
+    offer(planes_[patch_.cells()[patch_.cell_at(v.first_cell + i)].plane].contact);
+  if (touched && count == 0) return true;
+  SurfacePoint start;
+  FeatureContact f = find_point_contact(particle_, v.x, guess, settings_, point_for(guess, &start));
+  if (!f.touching && count > 0) {  // nor are its pieces, where a direction parts the body from all of them
+    if (!is_normal(f.normal)) f = find_way_out(particle_, v.x, settings_);
+    if (is_normal(f.normal)) most = kFarAway;
+  }
+  const bool out = f.touching && is_normal(f.normal) && f.gap > most + kWithin * radius_;
+  if (out) most = f.gap;
+  int best = -1;
+  if (out) {
+    SurfaceContact c = surface_contact(f, patch_.cells()[patch_.cell_at(v.first_cell)].triangle);
+    c.piece = SurfaceContact::vertex;
+    c.of[0] = v.triangle;
+    c.of[1] = v.corner;
+    best = add(c);
+  }
+  for (int i = 0; i < count; ++i)
+    if (near[i]->gap < most) drop(near[i], best);
+  return true;
+}
+
+}  // namespace nurbs
