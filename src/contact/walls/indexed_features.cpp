@@ -130,7 +130,7 @@ void SurfaceSearch::touch_vertex(int number) {
   const MeshPatch::Vertex& v = patch_.vertices()[number];
   if (v.inner || v.cells == 0) return;
   if ((particle_.x - v.x).squaredNorm() > radius_ * radius_) return;
-  const ActivePlane* shallowest = nullptr;
+  const ActivePlane* shallowest = &planes_[first_plane_of(v)];
   bool claimed = false;
   double deepest = 0;
   for (int i = 0; i < v.cells; ++i) {
@@ -139,7 +139,7 @@ void SurfaceSearch::touch_vertex(int number) {
     if (!met.active) return;
     claimed = claimed || met.claimed;
     deepest = std::min(deepest, met.result.gap);
-    if (!shallowest || met.result.gap > shallowest->result.gap) shallowest = &met;
+    if (met.result.gap > shallowest->result.gap) shallowest = &met;
   }
   if (finds_sharp(deepest) && touch_outer_vertex(number, shallowest->normal)) return;
   if (claimed) return;
