@@ -401,15 +401,13 @@ bool is_clear_of(const Particle& particle, const Vec3* points, int count) {
   Vec3 simplex[4];
   int size = 0;
   Vec3 d = particle.x - points[0];
-  SurfacePoint where;
   for (int k = 0; k < kApartSteps; ++k) {
     if (!(d.norm() > kRoundoff * particle.scale * particle.shape->bounding_radius)) return false;
     d.normalize();
     const Vec3* far = std::max_element(points, points + count,
                                        [&](const Vec3& p, const Vec3& q) { return d.dot(p) < d.dot(q); });
-    const FeatureGap g = gap_along(particle, *far, d, k > 0 ? &where : nullptr);
+    const FeatureGap g = gap_along(particle, *far, d, nullptr);
     if (g.gap > 0) return true;
-    where = g.where;
     simplex[size++] = particle.x - *far + g.on_body;
     d = nearest_to_origin(simplex, &size);
     if (size == 4) return false;

@@ -105,7 +105,7 @@ void SurfaceSearch::touch_edge(int number) {
               : !(f.along < e.length) ? MetEdge::beyond
                                       : MetEdge::along;
   if (met.state != MetEdge::along) return;
-  if (e.sides == 1 && covered(f, patch_.side(e.first_side).cell)) return;
+  if (e.sides == 1 && covered(f, straight_on(number))) return;
   if (finds_sharp(deepest) && !meets(a, e.direction, 0, e.length)) return;
   const auto triangle = [&](int i) { return patch_.cells()[patch_.side(e.first_side + i).cell].triangle; };
   add_feature(f, weight, triangle(0), smooth ? SurfaceContact::edge : SurfaceContact::under_edge, triangle(0),
@@ -114,11 +114,14 @@ void SurfaceSearch::touch_edge(int number) {
 
 // Whether a point of a border lies within another cell: meshes that overlap themselves have no border
 // there.
-bool SurfaceSearch::covered(const FeatureContact& f, int own) const {
+bool SurfaceSearch::covered(const FeatureContact& f, const std::vector<Stretch>& line) const {
   const Vec3 y = particle_.x + f.on_body - f.gap * f.normal;
   for (std::size_t c = 0; c < patch_.cells().size(); ++c) {
     const MeshPatch::Cell& cell = patch_.cells()[c];
-    if (static_cast<int>(c) == own || !planes_[cell.plane].active) continue;
+    const bool own = std::any_of(line.begin(), line.end(), [&](const Stretch& piece) {
+      return patch_.side(patch_.edges()[piece.edge].first_side).cell == static_cast<int>(c);
+    });
+    if (own || !planes_[cell.plane].active) continue;
     const MeshPatch::Plane& plane = patch_.planes()[cell.plane];
     if (std::abs(plane.normal.dot(y - plane.origin)) > kWithin * radius_) continue;
     if (in_cell(cell, y)) return true;

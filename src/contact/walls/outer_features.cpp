@@ -239,7 +239,7 @@ void SurfaceSearch::touch_outer_edge(int number, const Arc& arc, bool active) {
                     (std::abs(into(e, end).dot(apart + f.on_body)) < kWithin * radius_ ||
                      is_over(plane_of(e, end), particle_.x + f.on_body));
   if ((end < 0 || lies) && owner >= 0 && deeper(beside[0], f.gap) && deeper(beside[1], f.gap) &&
-      !(e.sides == 1 && covered(f, patch_.side(e.first_side).cell)) && meets(a, e.direction, low, high)) {
+      !(e.sides == 1 && covered(f, line)) && meets(a, e.direction, low, high)) {
     edges_[owner].state = MetEdge::along;
     const MeshPatch::Edge& o = patch_.edges()[owner];
     const auto triangle = [&](int i) { return patch_.cells()[patch_.side(o.first_side + i).cell].triangle; };

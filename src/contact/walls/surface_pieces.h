@@ -92,6 +92,7 @@ class SurfaceSearch {
   bool stands_on(const MeshPatch::Plane& plane, ActivePlane* met) const;
   bool stand_on(int number);
   bool stood_on(const Vec3& normal) const;
+  bool stays(const Vec3& normal) const;
   double clearance(const MeshPatch::Plane& plane) const;
   Vec3 nearest(const MeshPatch::Cell& cell, const MeshPatch::Plane& plane) const;
   bool look_at_plane(int number);
@@ -113,7 +114,7 @@ class SurfaceSearch {
   FeatureContact at_plane(const ActivePlane& met) const;
   bool all_open(const MeshPatch::Edge& e) const;
   void touch_edge(int number);
-  bool covered(const FeatureContact& f, int own) const;
+  bool covered(const FeatureContact& f, const std::vector<Stretch>& line) const;
   void touch_vertex(int number);
   bool lies_under(int number) const;
   MetEdge::State state(int edge) const;

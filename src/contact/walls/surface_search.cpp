@@ -154,6 +154,11 @@ bool SurfaceSearch::stand_on(int number) {
   return add_plane(number, triangle, true, met.result.gap, met.deepest);
 }
 
+// A corner that came under a cell from beside it need not meet the cell itself, but stays its contact.
+bool SurfaceSearch::stays(const Vec3& normal) const {
+  return edged(*particle_.shape) && stood_on(normal);
+}
+
 bool SurfaceSearch::stood_on(const Vec3& normal) const {
   for (int k = 0; k < former_count_; ++k)
     if (former_[k].normal.dot(normal) > kSamePlane) return true;
@@ -212,8 +217,7 @@ bool SurfaceSearch::look_at_plane(int number) {
   }
   met.normal = height < 0 ? Vec3(-plane.normal) : plane.normal;
   if (stands_on(plane, &met)) return met.active = met.stands = true;
-  // A corner that came under a cell from beside it need not meet the cell itself, but stays its contact.
-  if (plane.cells > 0 && plane.cells <= kFewCells && !(edged(*particle_.shape) && stood_on(met.normal))) {
+  if (plane.cells > 0 && plane.cells <= kFewCells && !stays(met.normal)) {
     const double clear = clearance(plane);
     if (clear > 0) {
       plane.expiry = path_ + (1 - 1e-12) * clear;
@@ -311,16 +315,18 @@ bool SurfaceSearch::passes_by(int number, const Vec3& deepest, double gap) const
   const double slope = planes_[number].normal.dot(-deepest);
   if (slope > 0 && is_over(number, particle_.x + deepest + gap / slope * deepest)) return false;
   const MeshPatch::Plane& plane = patch_.planes()[number];
+  bool over = false;
   for (int i = 0; i < plane.cells; ++i) {
     const MeshPatch::Cell& cell = patch_.cells()[patch_.cell_in(plane.first + i)];
     if (!in_cell(cell, particle_.x + deepest)) continue;
+    over = true;
     std::vector<Vec3>& corners = workspace().corners;
     corners.clear();
     for (int k = cell.first; k < cell.first + cell.corners; ++k)
       corners.push_back(patch_.vertices()[patch_.corner(k)].x);
     if (!is_clear_of(particle_, corners.data(), cell.corners)) return false;
   }
-  return true;
+  return over;
 }
 
 bool SurfaceSearch::add_plane(int number, int triangle, bool flat, double gap, const Vec3& on_body) {
