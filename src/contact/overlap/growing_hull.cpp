@@ -33,41 +33,45 @@ struct Edges {
     return lca >= lab ? ab.cross(bc) : bc.cross(ca);
   }
   double longest2() const { return std::max({lab, lbc, lca}); }
-  // Of a needle, square to its longest side to round-off: the corners may be far from where that matters.
+  int longest() const { return lab >= lbc && lab >= lca ? 0 : lbc >= lca ? 1 : 2; }
+  const Vec3& side(int k) const { return k == 0 ? ab : k == 1 ? bc : ca; }
+  // A normal made square to the longest side to round-off: a needle's corners may be far from where that
+  // matters.
   Vec3 upright(const Vec3& n) const {
-    const Vec3& side = lab >= lbc && lab >= lca ? ab : lbc >= lca ? bc : ca;
-    return n - n.dot(side) / longest2() * side;
+    const Vec3& long_side = side(longest());
+    return n - n.dot(long_side) / longest2() * long_side;
   }
 };
-
-}  // namespace
 
 // Weights of the plane's foot, from the longest edge: how far from it, as a share of the third corner's
 // height over it, then where along it. Of a needle the share is hardly known, but no error of it moves the
 // foot along.
-static Vec3 foot_weights(const Vec3& a, const Vec3& b, const Vec3& c) {
+Vec3 foot_weights(const Vec3& a, const Vec3& b, const Vec3& c) {
   const Vec3* const corner[3] = {&a, &b, &c};
-  const double length2[3] = {(b - a).squaredNorm(), (c - b).squaredNorm(), (a - c).squaredNorm()};
-  const int i = length2[0] >= length2[1] ? (length2[0] >= length2[2] ? 0 : 2)
-                                         : (length2[1] >= length2[2] ? 1 : 2),
-            j = (i + 1) % 3, k = (i + 2) % 3;
-  const Vec3 &p = *corner[i], &q = *corner[j], &r = *corner[k], edge = q - p;
-  // From the nearer ends, where differences keep their digits.
-  const bool from_q = q.squaredNorm() < p.squaredNorm(),
-             side_q = (r - q).squaredNorm() < (r - p).squaredNorm();
-  const auto along = [&](const Vec3& x, bool from) {
-    return from ? 1 + edge.dot(x) / length2[i] : edge.dot(x) / length2[i];
+  const Edges edges(a, b, c);
+  const int i = edges.longest(), j = (i + 1) % 3, k = (i + 2) % 3;
+  const Vec3 &p = *corner[i], &q = *corner[j], &r = *corner[k], &edge = edges.side(i);
+  const double length2 = edges.longest2();
+  // From the nearer ends, where differences keep their digits: 0 at p, 1 at q.
+  const auto along = [&](const Vec3& x, bool from_q) {
+    return from_q ? 1 + edge.dot(x - q) / length2 : edge.dot(x - p) / length2;
   };
-  const double t = from_q ? along(-q, true) : along(-p, false);
-  const Vec3 foot = from_q ? Vec3(q + (t - 1) * edge) : Vec3(p + t * edge);
-  const double tr = side_q ? along(r - q, true) : along(r - p, false);
-  const Vec3 up = side_q ? Vec3(r - q - (tr - 1) * edge) : Vec3(r - p - tr * edge);
+  const auto beside = [&](const Vec3& x, double t, bool from_q) {
+    return from_q ? Vec3(x - q - (t - 1) * edge) : Vec3(x - p - t * edge);
+  };
+  const Vec3 origin = Vec3::Zero();
+  const bool near_q = q.squaredNorm() < p.squaredNorm(),
+             side_q = (r - q).squaredNorm() < (r - p).squaredNorm();
+  const double t = along(origin, near_q), tr = along(r, side_q);
+  const Vec3 up = beside(r, tr, side_q);
   Vec3 w;
-  w[k] = -foot.dot(up) / up.squaredNorm();
+  w[k] = beside(origin, t, near_q).dot(up) / up.squaredNorm();
   w[j] = t - w[k] * tr;
   w[i] = 1 - w[j] - w[k];
   return w;
 }
+
+}  // namespace
 
 // Corners may be a million times as far from the origin as its nearest point: differences are taken from the
 // corner nearest to the origin, where they keep their digits, and the normal is of the two shorter edges.
@@ -134,8 +138,8 @@ void GrowingHull::set(int f, int a, int b, int c) {
     face.normal.setZero();
   else
     face.normal = 1 / std::sqrt(area2) * m;
-  if (!face.sliver && area2 < kNeedle * kNeedle * edges.longest2() * edges.longest2())
-    face.normal = edges.upright(face.normal).normalized();
+  face.needle = !face.sliver && area2 < kNeedle * kNeedle * edges.longest2() * edges.longest2();
+  if (face.needle) face.normal = edges.upright(face.normal).normalized();
   face.offset = std::min({face.normal.dot(p), face.normal.dot(q), face.normal.dot(r)});
   behind_ += face.offset < 0;
   foot_[f] = false;
@@ -158,14 +162,14 @@ void GrowingHull::find_foot(int f) {
     make_sliver(face);
   }
   distance2_[f] = nearest_point(face).squaredNorm();
-  if (face.sliver) return;
-  // Of a needle even the edge that the foot is beyond may be taken wrongly.
-  const Vec3 w = foot_weights(point_[face.vertex[0]], point_[face.vertex[1]], point_[face.vertex[2]]);
-  const Vec3 x =
-      w[0] * point_[face.vertex[0]] + w[1] * point_[face.vertex[1]] + w[2] * point_[face.vertex[2]];
-  if (!(w.minCoeff() > 0) || !(x.squaredNorm() < distance2_[f])) return;
-  face.weights = w;
-  distance2_[f] = x.squaredNorm();
+  if (!face.needle) return;
+  // Even the edge that the foot is beyond may be taken wrongly.
+  Face other = face;
+  other.weights = foot_weights(point_[face.vertex[0]], point_[face.vertex[1]], point_[face.vertex[2]]);
+  const double distance2 = nearest_point(other).squaredNorm();
+  if (!(other.weights.minCoeff() > 0) || !(distance2 < distance2_[f])) return;
+  face.weights = other.weights;
+  distance2_[f] = distance2;
 }
 
 // Whether a triangle has its plane's foot where its weights say, those settled once if need be: of a needle
@@ -190,6 +194,7 @@ bool GrowingHull::holds_foot(Face& face) const {
 void GrowingHull::make_sliver(Face& face) {
   behind_ -= face.offset < 0;
   face.sliver = true;
+  face.needle = false;
   face.normal.setZero();
   face.offset = 0;
 }

@@ -24,6 +24,7 @@ class GrowingHull {
     std::array<short, 3> across;  // face on the other side of the edge vertex[k] -> vertex[k + 1]
     bool alive;
     bool sliver;    // lower than `sliver_height`: normal and offset mean nothing
+    bool needle;    // low, but no sliver
     Vec3 normal;    // unit
     double offset;  // normal . vertex: signed distance of its plane from the origin
     Vec3 weights;   // of its point nearest to the origin, once that was asked for

@@ -37,20 +37,12 @@ struct Turned {
 
 class LineSearch {
  public:
-  LineSearch(const Particle& particle, const Vec3& a, const Vec3& direction, const Vec3& low,
-             const Vec3& high, double radius, const SurfacePoint* start)
-      : particle_(particle), a_(a), direction_(direction), radius_(radius), low_(low) {
-    if (start) start_ = *start, started_ = true;
-    // Turning from low towards high is turning about +-direction.
-    side_ = (high - low.dot(high) * low).normalized();
-    span_ = std::atan2(low.cross(high).norm(), low.dot(high));
-  }
-  LineSearch(const Particle& particle, const Vec3& a, const Vec3& direction, const Arc& arc,
+  LineSearch(const Particle& particle, const Vec3& a, const Vec3& direction, const Arc& arc, double radius,
              const SurfacePoint* start)
       : particle_(particle),
         a_(a),
         direction_(direction),
-        radius_(0),
+        radius_(radius),
         low_(arc.low),
         side_(arc.side),
         span_(arc.span) {
@@ -93,19 +85,24 @@ class LineSearch {
   static constexpr double kNarrow = 0.1;       // rad: a bracket that has one maximum
   static constexpr double kTilt = 1e-6;        // rad: lines less apart are along each other
   static constexpr int kLineSearches = 60;
+  static constexpr double kLineLevel = 1e-9;  // of the overlap: maxima that are one
   static constexpr int kArcCuts = 48;
 
   FeatureContact find_highest(double* angle) {
     Turned met[kArcCuts];
-    int count = 0, best = 0;
+    int count = 0;
+    const auto highest = [&] {
+      return static_cast<int>(
+          std::max_element(met, met + count,
+                           [](const Turned& s, const Turned& t) { return s.at.gap < t.at.gap; }) -
+          met);
+    };
     for (const double at : {0.0, 0.5 * span_, span_}) {
       met[count] = look(at);
       if (!(met[count++].at.gap < 0)) return {};
     }
     while (count < kArcCuts) {
-      for (int i = 0; i < count; ++i)
-        if (met[i].at.gap > met[best].at.gap) best = i;
-      const double level = met[best].at.gap + kLineLevel * std::abs(met[best].at.gap) + noise();
+      const double gap = met[highest()].at.gap, level = gap + kLineLevel * std::abs(gap) + noise();
       int top = -1, open = 0;
       double most = level, cut = 0;
       for (int i = 0; i + 1 < count; ++i) {
@@ -129,10 +126,8 @@ class LineSearch {
       if (!(next.at.gap < 0)) return {};
       for (int i = count++; i > top + 1; --i) met[i] = met[i - 1];
       met[top + 1] = next;
-      best = 0;
     }
-    for (int i = 0; i < count; ++i)
-      if (met[i].at.gap > met[best].at.gap) best = i;
+    const int best = highest();
     *angle = met[best].angle;
     // At a kink the next direction on the side to which f rises has the other support.
     const bool up = best == 0 || (best + 1 < count && met[best].slope > 0);
@@ -386,15 +381,20 @@ FeatureGap gap_along(const Particle& particle, const Vec3& a, const Vec3& d, con
   return g;
 }
 
+Arc arc_between(const Vec3& low, const Vec3& high) {
+  const double cosine = low.dot(high);
+  return {low, (high - cosine * low).normalized(), std::atan2(low.cross(high).norm(), cosine)};
+}
+
 FeatureContact find_line_contact(const Particle& particle, const Vec3& a, const Vec3& direction,
                                  const Vec3& low, const Vec3& high, double radius,
                                  const SurfacePoint* start) {
-  return LineSearch(particle, a, direction, low, high, radius, start).run();
+  return LineSearch(particle, a, direction, arc_between(low, high), radius, start).run();
 }
 
 FeatureContact find_highest_line_contact(const Particle& particle, const Vec3& a, const Vec3& direction,
                                          const Arc& arc, const SurfacePoint* start, double* angle) {
-  return LineSearch(particle, a, direction, arc, start).run_over_all(angle);
+  return LineSearch(particle, a, direction, arc, 0, start).run_over_all(angle);
 }
 
 bool is_clear_of(const Particle& particle, const Vec3* points, int count) {

@@ -14,8 +14,6 @@
 
 namespace nurbs {
 
-constexpr double kLineLevel = 1e-9;
-
 struct FeatureContact {
   bool touching = false;                 // else nothing below means anything, but for points
   double gap = 0;                        // < 0
@@ -26,13 +24,6 @@ struct FeatureContact {
   SurfacePoint where;                    // the body's surface point, to start from next time
 };
 
-// A line through `a` with unit `direction`. `low` and `high` are unit, square to the line and less than half
-// a turn apart, f rising from `low` towards `high` and falling from `high` towards `low` again: the maximum
-// lies between them. Equal ones are the answer themselves. Bisection where f has a kink, secant where it is
-// smooth: 3 to 8 support searches, fewer when the body is clear. The normal is right to 1e-11 rad.
-FeatureContact find_line_contact(const Particle& particle, const Vec3& a, const Vec3& direction,
-                                 const Vec3& low, const Vec3& high, double radius, const SurfacePoint* start);
-
 // The directions square to a line from `low` on towards `side`, both unit, square to each other and to the
 // line: d = cos(angle) low + sin(angle) side, 0 <= angle <= span <= pi.
 struct Arc {
@@ -40,10 +31,20 @@ struct Arc {
   double span = 0;
   Vec3 end(int which) const { return which == 0 ? low : Vec3(std::cos(span) * low + std::sin(span) * side); }
 };
+// From one direction to another, not opposite ones.
+Arc arc_between(const Vec3& low, const Vec3& high);
+
+// A line through `a` with unit `direction`. `low` and `high` are unit, square to the line and less than half
+// a turn apart, f rising from `low` towards `high` and falling from `high` towards `low` again: the maximum
+// lies between them. Equal ones are the answer themselves. Bisection where f has a kink, secant where it is
+// smooth: 3 to 8 support searches, fewer when the body is clear. The normal is right to 1e-11 rad.
+FeatureContact find_line_contact(const Particle& particle, const Vec3& a, const Vec3& direction,
+                                 const Vec3& low, const Vec3& high, double radius, const SurfacePoint* start);
+
 // The highest maximum of f over the arc, whatever others there are: a body sharper than its overlap is deep
 // has several. Every support bounds f above by a sinusoid, two of them on the interval between; the highest
 // interval is cut where its two meet. `angle` receives the direction's, 0 or the span where f is highest at
-// an end. Maxima that differ by less than kLineLevel of the overlap are taken for one.
+// an end. Maxima that differ by less than 1e-9 of the overlap are taken for one.
 FeatureContact find_highest_line_contact(const Particle& particle, const Vec3& a, const Vec3& direction,
                                          const Arc& arc, const SurfacePoint* start, double* angle);
 

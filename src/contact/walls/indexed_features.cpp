@@ -9,10 +9,10 @@ namespace nurbs {
 
 bool SurfaceSearch::range(const MeshPatch::Edge& e, Range* r) const {
   const Vec3 a = patch_.vertices()[e.v[0]].x;
-  const ActivePlane& first = planes_[patch_.cells()[patch_.side(e.first_side).cell].plane];
+  const ActivePlane& first = planes_[plane_of(e, 0)];
   double low = -kFarAway, high = kFarAway;
-  for (int i = e.first_side; i < e.first_side + e.sides; ++i) {
-    const ActivePlane& met = planes_[patch_.cells()[patch_.side(i).cell].plane];
+  for (int i = 0; i < e.sides; ++i) {
+    const ActivePlane& met = planes_[plane_of(e, i)];
     const double angle =
         std::atan2(e.direction.dot(first.normal.cross(met.normal)), first.normal.dot(met.normal));
     const double slope = e.direction.cross(met.normal).dot(particle_.x - a + met.deepest);
@@ -40,8 +40,8 @@ int SurfaceSearch::first_plane_of(const MeshPatch::Vertex& v) const {
 // shallower one takes over at once.
 FeatureContact SurfaceSearch::pointed(const MeshPatch::Edge& e) const {
   const ActivePlane* shallowest = nullptr;
-  for (int i = e.first_side; i < e.first_side + e.sides; ++i) {
-    const ActivePlane& met = planes_[patch_.cells()[patch_.side(i).cell].plane];
+  for (int i = 0; i < e.sides; ++i) {
+    const ActivePlane& met = planes_[plane_of(e, i)];
     if (!shallowest || met.result.gap > shallowest->result.gap) shallowest = &met;
   }
   FeatureContact f = at_plane(*shallowest);
@@ -60,11 +60,17 @@ FeatureContact SurfaceSearch::at_plane(const ActivePlane& met) const {
 }
 
 bool SurfaceSearch::all_open(const MeshPatch::Edge& e) const {
-  for (int i = e.first_side; i < e.first_side + e.sides; ++i) {
-    const ActivePlane& met = planes_[patch_.cells()[patch_.side(i).cell].plane];
+  for (int i = 0; i < e.sides; ++i) {
+    const ActivePlane& met = planes_[plane_of(e, i)];
     if (!met.active || met.claimed) return false;
   }
   return true;
+}
+
+// Whether the plane of an edge's side has its deepest point on that side.
+bool SurfaceSearch::has_deepest(const MeshPatch::Edge& e, int side) const {
+  const int plane = plane_of(e, side);
+  return patch_.side(e.first_side + side).sign * inside(planes_[plane], patch_.planes()[plane], e) > 0;
 }
 
 void SurfaceSearch::touch_edge(int number) {
@@ -82,11 +88,8 @@ void SurfaceSearch::touch_edge(int number) {
   if (finds_sharp(deepest) && outer_arc(e, &arc)) return touch_outer_edge(number, arc, active);
   if (!all_open(e)) return;
   int weight = 1;
-  for (int i = e.first_side; i < e.first_side + e.sides; ++i) {
-    const MeshPatch::Side& side = patch_.side(i);
-    const int plane = patch_.cells()[side.cell].plane;
-    if (side.sign * inside(planes_[plane], patch_.planes()[plane], e) > 0) --weight;
-  }
+  for (int i = 0; i < e.sides; ++i)
+    if (has_deepest(e, i)) --weight;
   if (weight == 0) return;
   const Vec3& a = patch_.vertices()[e.v[0]].x;
   if (from_edge(patch_, e, particle_.x).squaredNorm() > radius_ * radius_) {
@@ -107,9 +110,7 @@ void SurfaceSearch::touch_edge(int number) {
   if (met.state != MetEdge::along) return;
   if (e.sides == 1 && covered(f, straight_on(number))) return;
   if (finds_sharp(deepest) && !meets(a, e.direction, 0, e.length)) return;
-  const auto triangle = [&](int i) { return patch_.cells()[patch_.side(e.first_side + i).cell].triangle; };
-  add_feature(f, weight, triangle(0), smooth ? SurfaceContact::edge : SurfaceContact::under_edge, triangle(0),
-              e.sides > 1 ? triangle(1) : -1);
+  add_edge(f, weight, e, smooth ? SurfaceContact::edge : SurfaceContact::under_edge);
 }
 
 // Whether a point of a border lies within another cell: meshes that overlap themselves have no border
@@ -146,9 +147,10 @@ void SurfaceSearch::touch_vertex(int number) {
   }
   if (finds_sharp(deepest) && touch_outer_vertex(number, shallowest->normal)) return;
   if (claimed) return;
-  if (edged(*particle_.shape) && lies_under(number))
-    return add_feature(at_plane(*shallowest), 1, patch_.cells()[patch_.cell_at(v.first_cell)].triangle,
-                       SurfaceContact::under_vertex, v.triangle, v.corner);
+  if (edged(*particle_.shape) && lies_under(number)) {
+    add_vertex(at_plane(*shallowest), 1, v, SurfaceContact::under_vertex);
+    return;
+  }
   for (int i = 0; i < v.edges; ++i)
     if (state(patch_.edge_at(v.first_edge + i)) == MetEdge::clear) return;
   SurfacePoint start;
@@ -163,8 +165,7 @@ void SurfaceSearch::touch_vertex(int number) {
   for (int i = 0; i < v.cells; ++i)
     if (cell_climbs(patch_.cell_at(v.first_cell + i), number, f.normal)) --weight;
   if (weight == 0) return;
-  add_feature(f, weight, patch_.cells()[patch_.cell_at(v.first_cell)].triangle, SurfaceContact::vertex,
-              v.triangle, v.corner);
+  add_vertex(f, weight, v, SurfaceContact::vertex);
 }
 
 // Whether a corner of the body is in a pit below a vertex: beyond the ends of all its edges, so that no
@@ -174,10 +175,9 @@ bool SurfaceSearch::lies_under(int number) const {
   for (int i = 0; i < v.edges; ++i) {
     const MeshPatch::Edge& e = patch_.edges()[patch_.edge_at(v.first_edge + i)];
     if (e.sides < 2) return false;
-    const Vec3 away = e.v[0] == number ? e.direction : Vec3(-e.direction);
     for (int k = 0; k < v.cells; ++k) {
       const ActivePlane& met = planes_[patch_.cells()[patch_.cell_at(v.first_cell + k)].plane];
-      if (away.dot(particle_.x + met.deepest - v.x) > 0) return false;
+      if (away(e, number) * e.direction.dot(particle_.x + met.deepest - v.x) > 0) return false;
     }
   }
   return true;
@@ -200,7 +200,7 @@ bool SurfaceSearch::climbs(int edge, int vertex, const Vec3& d) const {
     case MetEdge::beyond:
       return first;
     default:
-      return (first ? 1 : -1) * e.direction.dot(d) > 0;
+      return away(e, vertex) * e.direction.dot(d) > 0;
   }
 }
 
@@ -214,16 +214,30 @@ bool SurfaceSearch::cell_climbs(int number, int vertex, const Vec3& d) const {
   return false;
 }
 
-void SurfaceSearch::add_feature(const FeatureContact& f, int weight, int triangle,
-                                SurfaceContact::Piece piece, int first, int second) {
+int SurfaceSearch::add_edge(const FeatureContact& f, int weight, const MeshPatch::Edge& e,
+                            SurfaceContact::Piece piece) {
+  const auto triangle = [&](int i) { return patch_.cells()[patch_.side(e.first_side + i).cell].triangle; };
+  return add_feature(f, weight, triangle(0), piece, triangle(0), e.sides > 1 ? triangle(1) : -1);
+}
+
+int SurfaceSearch::add_vertex(const FeatureContact& f, int weight, const MeshPatch::Vertex& v,
+                              SurfaceContact::Piece piece) {
+  return add_feature(f, weight, patch_.cells()[patch_.cell_at(v.first_cell)].triangle, piece, v.triangle,
+                     v.corner);
+}
+
+// Number of the contact; -1 where it is not one or there is no more room.
+int SurfaceSearch::add_feature(const FeatureContact& f, int weight, int triangle, SurfaceContact::Piece piece,
+                               int first, int second) {
   const Shape& shape = *particle_.shape;
-  if (weight < 0 && edged(shape) && -f.gap > kBluntest * particle_.scale * shape.curvature.min_radius) return;
+  if (weight < 0 && edged(shape) && -f.gap > kBluntest * particle_.scale * shape.curvature.min_radius)
+    return -1;
   SurfaceContact c = surface_contact(f, triangle);
   c.weight = weight;
   c.piece = piece;
   c.of[0] = first;
   c.of[1] = second;
-  add(c);
+  return add(c);
 }
 
 }  // namespace nurbs

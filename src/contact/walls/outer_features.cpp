@@ -26,7 +26,7 @@ SurfaceSearch::Cone SurfaceSearch::cone_at(int number) const {
     for (int k = 0; k < v.edges; ++k) {
       const MeshPatch::Edge& e = patch_.edges()[patch_.edge_at(v.first_edge + k)];
       if (e.sides != 2) return Cone::other;
-      const double height = (e.v[0] == number ? 1 : -1) * n.dot(e.direction);
+      const double height = away(e, number) * n.dot(e.direction);
       low = std::min(low, height);
       high = std::max(high, height);
     }
@@ -64,10 +64,8 @@ bool SurfaceSearch::outer_arc(const MeshPatch::Edge& e, Arc* arc) const {
     return false;
   for (int i = 0; i < 2; ++i)
     if (inward[1 - i].dot(normal[i]) > 0) normal[i] = -normal[i];
-  const double cosine = normal[0].dot(normal[1]);
-  const Vec3 side = normal[1] - cosine * normal[0];
-  if (!(side.norm() > 1e-12)) return false;
-  *arc = {normal[0], side.normalized(), std::atan2(normal[0].cross(normal[1]).norm(), cosine)};
+  if (!(normal[0].cross(normal[1]).norm() > 1e-12)) return false;
+  *arc = arc_between(normal[0], normal[1]);
   return true;
 }
 
@@ -139,7 +137,7 @@ const std::vector<Stretch>& SurfaceSearch::straight_on(int number) {
       for (int i = 0; i < vertex.edges && !found; ++i) {
         const int next = patch_.edge_at(vertex.first_edge + i);
         const MeshPatch::Edge& n = patch_.edges()[next];
-        const double sign = (n.v[0] == v ? 1 : -1) * (way ? 1 : -1);
+        const double sign = away(n, v) * (way ? 1 : -1);
         found = next != last && !n.inner && sign * n.direction.dot(e.direction) > kStraightOn &&
                 same_planes(n, e);
         if (!found) continue;
@@ -203,9 +201,7 @@ void SurfaceSearch::touch_outer_edge(int number, const Arc& arc, bool active) {
     if (!planes_[p].active) continue;
     beside[i] = contact_beside(e, i, arc, low, high);
     if (planes_[p].claimed) free = false;
-    if (patch_.side(e.first_side + i).sign * inside(planes_[p], patch_.planes()[p], e) > 0 &&
-        kept(planes_[p].contact))
-      free = false;
+    if (has_deepest(e, i) && kept(planes_[p].contact)) free = false;
   }
   if (!free && !beside[0] && !beside[1]) return;
   double angle = 0;
@@ -241,13 +237,7 @@ void SurfaceSearch::touch_outer_edge(int number, const Arc& arc, bool active) {
   if ((end < 0 || lies) && owner >= 0 && deeper(beside[0], f.gap) && deeper(beside[1], f.gap) &&
       !(e.sides == 1 && covered(f, line)) && meets(a, e.direction, low, high)) {
     edges_[owner].state = MetEdge::along;
-    const MeshPatch::Edge& o = patch_.edges()[owner];
-    const auto triangle = [&](int i) { return patch_.cells()[patch_.side(o.first_side + i).cell].triangle; };
-    SurfaceContact c = surface_contact(f, triangle(0));
-    c.piece = SurfaceContact::edge;
-    c.of[0] = triangle(0);
-    c.of[1] = o.sides > 1 ? triangle(1) : -1;
-    const int contact = edges_[owner].contact = add(c);
+    const int contact = edges_[owner].contact = add_edge(f, 1, patch_.edges()[owner], SurfaceContact::edge);
     for (const SurfaceContact* other : beside) drop(other, contact);
     if (face) face->contact = contact;
     return;
@@ -256,9 +246,7 @@ void SurfaceSearch::touch_outer_edge(int number, const Arc& arc, bool active) {
   for (int i = 0; i < 2 && e.sides == 2; ++i) {
     const SurfaceContact* other = beside[1 - i];
     const int there = instead_of(planes_[plane_of(e, i)].contact);
-    if (other && there >= 0 && kept(there) != other && out_.contact[there].gap > other->gap &&
-        f.gap > other->gap)
-      drop(other, there);
+    if (other && there >= 0 && out_.contact[there].gap > other->gap && f.gap > other->gap) drop(other, there);
   }
 }
 
@@ -282,7 +270,7 @@ bool SurfaceSearch::touch_outer_vertex(int number, const Vec3& guess) {
   const auto is_normal = [&](const Vec3& d) {
     for (int i = 0; i < v.edges; ++i) {
       const MeshPatch::Edge& e = patch_.edges()[patch_.edge_at(v.first_edge + i)];
-      if ((e.v[0] == number ? 1 : -1) * e.direction.dot(d) > kOneSide) return false;
+      if (away(e, number) * e.direction.dot(d) > kOneSide) return false;
     }
     return true;
   };
@@ -310,15 +298,10 @@ bool SurfaceSearch::touch_outer_vertex(int number, const Vec3& guess) {
     if (!is_normal(f.normal)) f = find_way_out(particle_, v.x, settings_);
     if (is_normal(f.normal)) most = kFarAway;
   }
-  const bool out = f.touching && is_normal(f.normal) && f.gap > most + kWithin * radius_;
-  if (out) most = f.gap;
   int best = -1;
-  if (out) {
-    SurfaceContact c = surface_contact(f, patch_.cells()[patch_.cell_at(v.first_cell)].triangle);
-    c.piece = SurfaceContact::vertex;
-    c.of[0] = v.triangle;
-    c.of[1] = v.corner;
-    best = add(c);
+  if (f.touching && is_normal(f.normal) && f.gap > most + kWithin * radius_) {
+    most = f.gap;
+    best = add_vertex(f, 1, v, SurfaceContact::vertex);
   }
   for (int i = 0; i < count; ++i)
     if (near[i]->gap < most) drop(near[i], best);

@@ -40,6 +40,11 @@ inline Vec3 from_edge(const MeshPatch& patch, const MeshPatch::Edge& e, const Ve
   return apart - std::clamp(apart.dot(e.direction), 0.0, e.length) * e.direction;
 }
 
+// The sign of an edge's direction as it leads away from one of its vertices.
+inline double away(const MeshPatch::Edge& e, int vertex) {
+  return e.v[0] == vertex ? 1 : -1;
+}
+
 // An edge as a piece of a line.
 struct Stretch {
   int edge;
@@ -92,7 +97,6 @@ class SurfaceSearch {
   bool stands_on(const MeshPatch::Plane& plane, ActivePlane* met) const;
   bool stand_on(int number);
   bool stood_on(const Vec3& normal) const;
-  bool stays(const Vec3& normal) const;
   double clearance(const MeshPatch::Plane& plane) const;
   Vec3 nearest(const MeshPatch::Cell& cell, const MeshPatch::Plane& plane) const;
   bool look_at_plane(int number);
@@ -113,6 +117,7 @@ class SurfaceSearch {
   FeatureContact pointed(const MeshPatch::Edge& e) const;
   FeatureContact at_plane(const ActivePlane& met) const;
   bool all_open(const MeshPatch::Edge& e) const;
+  bool has_deepest(const MeshPatch::Edge& e, int side) const;
   void touch_edge(int number);
   bool covered(const FeatureContact& f, const std::vector<Stretch>& line) const;
   void touch_vertex(int number);
@@ -120,8 +125,11 @@ class SurfaceSearch {
   MetEdge::State state(int edge) const;
   bool climbs(int edge, int vertex, const Vec3& d) const;
   bool cell_climbs(int number, int vertex, const Vec3& d) const;
-  void add_feature(const FeatureContact& f, int weight, int triangle, SurfaceContact::Piece piece, int first,
-                   int second);
+  int add_edge(const FeatureContact& f, int weight, const MeshPatch::Edge& e, SurfaceContact::Piece piece);
+  int add_vertex(const FeatureContact& f, int weight, const MeshPatch::Vertex& v,
+                 SurfaceContact::Piece piece);
+  int add_feature(const FeatureContact& f, int weight, int triangle, SurfaceContact::Piece piece, int first,
+                  int second);
 
   // Edges and vertices that stand out.
   bool finds_sharp(double gap) const;

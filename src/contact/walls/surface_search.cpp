@@ -154,11 +154,6 @@ bool SurfaceSearch::stand_on(int number) {
   return add_plane(number, triangle, true, met.result.gap, met.deepest);
 }
 
-// A corner that came under a cell from beside it need not meet the cell itself, but stays its contact.
-bool SurfaceSearch::stays(const Vec3& normal) const {
-  return edged(*particle_.shape) && stood_on(normal);
-}
-
 bool SurfaceSearch::stood_on(const Vec3& normal) const {
   for (int k = 0; k < former_count_; ++k)
     if (former_[k].normal.dot(normal) > kSamePlane) return true;
@@ -217,7 +212,8 @@ bool SurfaceSearch::look_at_plane(int number) {
   }
   met.normal = height < 0 ? Vec3(-plane.normal) : plane.normal;
   if (stands_on(plane, &met)) return met.active = met.stands = true;
-  if (plane.cells > 0 && plane.cells <= kFewCells && !stays(met.normal)) {
+  // A corner that came under a cell from beside it need not meet the cell itself, but stays its contact.
+  if (plane.cells > 0 && plane.cells <= kFewCells && !(edged(*particle_.shape) && stood_on(met.normal))) {
     const double clear = clearance(plane);
     if (clear > 0) {
       plane.expiry = path_ + (1 - 1e-12) * clear;
