@@ -25,7 +25,7 @@ std::vector<Vec3> starts_beside(const Vec3& d, double widest, Random& random) {
 }
 
 double least_overlap(const std::function<double(const Vec3&)>& p, const std::vector<Vec3>& starts,
-                     const Compass& compass, Random& random) {
+                     const Compass& compass, Random random) {
   struct Place {
     double p;
     Vec3 d;
