@@ -23,8 +23,9 @@ struct Compass {
   int moves = 600;                     // at most
 };
 
-// The least p found from `starts`, unit: what can be found is no proof, but the minimum is not above it. `random` is
-// a copy: how much a search draws depends on the last digits, and what its caller draws next must not.
+// The least p found from `starts`, unit: what can be found is no proof, but the minimum is not above it.
+// `random` is a copy: how much a search draws depends on the last digits, and what its caller draws next must
+// not.
 double least_overlap(const std::function<double(const Vec3&)>& p, const std::vector<Vec3>& starts,
                      const Compass& compass, Random random);
 

@@ -84,6 +84,7 @@ class LineSearch {
   static constexpr double kLineAngle = 1e-12;  // rad, of the bracket
   static constexpr double kNarrow = 0.1;       // rad: a bracket that has one maximum
   static constexpr double kTilt = 1e-6;        // rad: lines less apart are along each other
+  static constexpr double kBeside = 1e-9;      // rad: beside a kink
   static constexpr int kLineSearches = 60;
   static constexpr double kLineLevel = 1e-9;  // of the overlap: maxima that are one
   static constexpr int kArcCuts = 48;
@@ -129,7 +130,10 @@ class LineSearch {
     }
     const int best = highest();
     *angle = met[best].angle;
-    // At a kink the next direction on the side to which f rises has the other support.
+    // At a kink the directions on either side have its two supports.
+    const double left = std::max(0.0, *angle - kBeside), right = std::min(span_, *angle + kBeside);
+    if (!particle_.shape->smooth && left < *angle && *angle < right)
+      return between(met[best], look(left), look(right));
     const bool up = best == 0 || (best + 1 < count && met[best].slope > 0);
     const int other = up ? best + 1 : best - 1;
     return up ? finish(met[best], met[other]) : finish(met[other], met[best]);
@@ -254,7 +258,10 @@ class LineSearch {
 
   // Between the two supports lies the point over the line.
   FeatureContact finish(const Turned& low, const Turned& high) const {
-    const Turned& best = low.at.gap > high.at.gap ? low : high;
+    return between(low.at.gap > high.at.gap ? low : high, low, high);
+  }
+
+  FeatureContact between(const Turned& best, const Turned& low, const Turned& high) const {
     FeatureContact c = contact(best.at, best.d);
     // Their own slopes are those of their own directions, which a kink found early leaves apart.
     const double to_low = slope_at(best.angle, low.at), to_high = slope_at(best.angle, high.at);
@@ -415,6 +422,8 @@ bool is_clear_of(const Particle& particle, const Vec3* points, int count) {
   return false;
 }
 
+namespace {
+
 FeatureContact find_way_out(const Particle& particle, const Vec3& a, const ContactSettings& settings) {
   static const std::shared_ptr<const Shape> kBall = make_shape("ball", exact_ellipsoid(Vec3::Ones()));
   Particle ball;
@@ -434,15 +443,20 @@ FeatureContact find_way_out(const Particle& particle, const Vec3& a, const Conta
   return c;
 }
 
+}  // namespace
+
+bool find_only_way_out(const Particle& particle, const Vec3& a, const Vec3& guess, const SurfacePoint* start,
+                       FeatureContact* out) {
+  // A ball of the least curvature radius rolls inside: from no deeper than that, a normal is the shortest
+  // way, and the only one.
+  return find_foot(particle, a, guess, start, out) &&
+         (!out->touching || -out->gap <= particle.scale * particle.shape->curvature.min_radius);
+}
+
 FeatureContact find_point_contact(const Particle& particle, const Vec3& a, const Vec3& guess,
                                   const ContactSettings& settings, const SurfacePoint* start) {
-  // A ball of the least curvature radius rolls inside: from no deeper than that, a normal is the shortest
-  // way.
   FeatureContact c;
-  if (find_foot(particle, a, guess, start, &c) &&
-      (!c.touching || -c.gap <= particle.scale * particle.shape->curvature.min_radius))
-    return c;
-  return find_way_out(particle, a, settings);
+  return find_only_way_out(particle, a, guess, start, &c) ? c : find_way_out(particle, a, settings);
 }
 
 }  // namespace nurbs

@@ -50,13 +50,22 @@ FeatureContact find_highest_line_contact(const Particle& particle, const Vec3& a
 
 // The shortest way out of the body for a point `a`, in any direction; `guess` is one near it. Newton by the
 // body's curvature, 2 to 4 support searches; where that fails (kinks, flats) or another way may be shorter
-// (deeper than the least curvature radius), find_way_out. Not touching, `normal` is a direction with f >= 0.
+// (deeper than the least curvature radius), by the contact of the body with a ball about the point, less the
+// ball's radius.
 FeatureContact find_point_contact(const Particle& particle, const Vec3& a, const Vec3& guess,
                                   const ContactSettings& settings, const SurfacePoint* start);
 
-// The same by the contact of the body with a ball about the point, less the ball's radius. Of a point outside
-// the body, gap and normal are those of the shortest distance.
-FeatureContact find_way_out(const Particle& particle, const Vec3& a, const ContactSettings& settings);
+// The former alone: false where it fails or another way may be shorter. Not touching, `normal` is a direction
+// with f >= 0.
+bool find_only_way_out(const Particle& particle, const Vec3& a, const Vec3& guess, const SurfacePoint* start,
+                       FeatureContact* out);
+
+// The highest of f over the directions d with edge . d <= 0 for all `edges` of a vertex `a`, whatever other
+// maxima there are; of those not above `level` (< 0) any. Branch and bound over spherical triangles, some 60
+// support searches. The gap is right to 1e-9 of itself. Not touching, `normal` is a direction of the cone
+// with f >= 0; where the cone has none, the gap is -kFarAway.
+FeatureContact find_highest_point_contact(const Particle& particle, const Vec3& a, const Vec3* edges,
+                                          int count, double level, const SurfacePoint* start);
 
 // Whether a direction parts the body from the convex hull of `count` points. Gilbert, Johnson & Keerthi 1988;
 // not said of bodies that all but touch it.

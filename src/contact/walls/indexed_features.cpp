@@ -109,7 +109,9 @@ void SurfaceSearch::touch_edge(int number) {
                                       : MetEdge::along;
   if (met.state != MetEdge::along) return;
   if (e.sides == 1 && covered(f, straight_on(number))) return;
-  if (finds_sharp(deepest) && !meets(a, e.direction, 0, e.length)) return;
+  // It may meet the line beyond, and be deepest over the edge.
+  const Vec3 ends[2] = {a, a + e.length * e.direction};
+  if (finds_sharp(deepest) && is_clear_of(particle_, ends, 2)) return;
   add_edge(f, weight, e, smooth ? SurfaceContact::edge : SurfaceContact::under_edge);
 }
 

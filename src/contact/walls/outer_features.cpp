@@ -98,9 +98,14 @@ const SurfaceContact* SurfaceSearch::contact_beside(const MeshPatch::Edge& e, in
   const Vec3 inward = into(e, side), y = on_wall(*c) - patch_.vertices()[e.v[0]].x;
   const double in = inward.dot(y), along = e.direction.dot(y);
   if (in < -kWithin * radius_ || along < low + c->gap || along > high - c->gap) return nullptr;
-  const bool behind = e.sides == 2 && c->normal.dot(arc.end(side)) < 0;  // its way out leads into the wall
-  if (!behind && in * std::sin(arc.span) >= -c->gap * (1 - std::cos(arc.span))) return nullptr;
+  if (!leads_in(c, e, side, arc) && in * std::sin(arc.span) >= -c->gap * (1 - std::cos(arc.span)))
+    return nullptr;
   return c;
+}
+
+// Whether the way out of a contact with the plane of an edge's side leads into the wall: it is from behind.
+bool SurfaceSearch::leads_in(const SurfaceContact* c, const MeshPatch::Edge& e, int side, const Arc& arc) {
+  return c && e.sides == 2 && c->normal.dot(arc.end(side)) < 0;
 }
 
 // Leaves a contact out, for another if there is one.
@@ -171,10 +176,15 @@ bool SurfaceSearch::is_on_line(int number) const {
   return false;
 }
 
-// Whether the body meets a piece of a line: it may meet the line beyond, and be deepest over the piece.
-bool SurfaceSearch::meets(const Vec3& a, const Vec3& direction, double low, double high) const {
-  const Vec3 ends[2] = {a + low * direction, a + high * direction};
-  return !is_clear_of(particle_, ends, 2);
+// Whether the body meets the wall beside a line: it may meet the line beyond, and be deepest over this piece.
+bool SurfaceSearch::meets(const std::vector<Stretch>& line) const {
+  std::vector<Vec3>& corners = workspace().corners;
+  corners.clear();
+  for (const Stretch& piece : line) {
+    const MeshPatch::Edge& e = patch_.edges()[piece.edge];
+    for (int i = e.first_side; i < e.first_side + e.sides; ++i) add_corners(patch_.side(i).cell, &corners);
+  }
+  return !is_clear_of(particle_, corners.data(), static_cast<int>(corners.size()));
 }
 
 // An edge that stands out, with those that go straight on from it.
@@ -234,19 +244,24 @@ void SurfaceSearch::touch_outer_edge(int number, const Arc& arc, bool active) {
                     instead_of(face->contact) < 0 && face->normal.dot(f.normal) > kSamePlane &&
                     (std::abs(into(e, end).dot(apart + f.on_body)) < kWithin * radius_ ||
                      is_over(plane_of(e, end), particle_.x + f.on_body));
-  if ((end < 0 || lies) && owner >= 0 && deeper(beside[0], f.gap) && deeper(beside[1], f.gap) &&
-      !(e.sides == 1 && covered(f, line)) && meets(a, e.direction, low, high)) {
+  const auto gives_way = [&](int side) {
+    return leads_in(beside[side], e, side, arc) || deeper(beside[side], f.gap);
+  };
+  if ((end < 0 || lies) && owner >= 0 && gives_way(0) && gives_way(1) &&
+      !(e.sides == 1 && covered(f, line)) && meets(line)) {
     edges_[owner].state = MetEdge::along;
     const int contact = edges_[owner].contact = add_edge(f, 1, patch_.edges()[owner], SurfaceContact::edge);
     for (const SurfaceContact* other : beside) drop(other, contact);
     if (face) face->contact = contact;
     return;
   }
-  // The way out of the one face leads out of the other, if it is shorter.
+  // The way out of the one face leads out of the other, if it is shorter or the other's leads in.
   for (int i = 0; i < 2 && e.sides == 2; ++i) {
     const SurfaceContact* other = beside[1 - i];
     const int there = instead_of(planes_[plane_of(e, i)].contact);
-    if (other && there >= 0 && out_.contact[there].gap > other->gap && f.gap > other->gap) drop(other, there);
+    if (!other || there < 0 || leads_in(&out_.contact[there], e, i, arc)) continue;
+    const bool shorter = out_.contact[there].gap > other->gap && f.gap > other->gap;
+    if (shorter || leads_in(other, e, 1 - i, arc)) drop(other, there);
   }
 }
 
@@ -267,12 +282,14 @@ bool SurfaceSearch::touch_outer_vertex(int number, const Vec3& guess) {
   int count = 0;
   bool touched = false;
   double most = -kFarAway;
+  std::vector<Vec3>& edges = workspace().corners;
+  edges.clear();
+  for (int i = 0; i < v.edges; ++i) {
+    const MeshPatch::Edge& e = patch_.edges()[patch_.edge_at(v.first_edge + i)];
+    edges.push_back(away(e, number) * e.direction);
+  }
   const auto is_normal = [&](const Vec3& d) {
-    for (int i = 0; i < v.edges; ++i) {
-      const MeshPatch::Edge& e = patch_.edges()[patch_.edge_at(v.first_edge + i)];
-      if (away(e, number) * e.direction.dot(d) > kOneSide) return false;
-    }
-    return true;
+    return std::all_of(edges.begin(), edges.end(), [&](const Vec3& e) { return e.dot(d) <= kOneSide; });
   };
   const auto offer = [&](int contact) {
     const SurfaceContact* c = kept(contact);
@@ -293,13 +310,20 @@ bool SurfaceSearch::touch_outer_vertex(int number, const Vec3& guess) {
     offer(planes_[patch_.cells()[patch_.cell_at(v.first_cell + i)].plane].contact);
   if (touched && count == 0) return true;
   SurfacePoint start;
-  FeatureContact f = find_point_contact(particle_, v.x, guess, settings_, point_for(guess, &start));
-  if (!f.touching && count > 0) {  // nor are its pieces, where a direction parts the body from all of them
-    if (!is_normal(f.normal)) f = find_way_out(particle_, v.x, settings_);
-    if (is_normal(f.normal)) most = kFarAway;
+  const SurfacePoint* from = point_for(guess, &start);
+  FeatureContact f;
+  bool own = find_only_way_out(particle_, v.x, guess, from, &f);
+  if (own ? !f.touching && !is_normal(f.normal) : true) {
+    f = find_highest_point_contact(particle_, v.x, edges.data(), v.edges, most, from);
+    // Where f is highest at the border of the normals and goes on to rise, an edge has the contact.
+    own = std::all_of(edges.begin(), edges.end(), [&](const Vec3& e) {
+      return e.dot(f.normal) <= -kBorder ||
+             gap_along(particle_, v.x, (f.normal + 10 * kBorder * e).normalized(), &f.where).gap <= f.gap;
+    });
   }
+  if (!f.touching) most = kFarAway;  // nor are its pieces, where a normal parts the body from all of them
   int best = -1;
-  if (f.touching && is_normal(f.normal) && f.gap > most + kWithin * radius_) {
+  if (own && f.touching && is_normal(f.normal) && f.gap > most + kWithin * radius_) {
     most = f.gap;
     best = add_vertex(f, 1, v, SurfaceContact::vertex);
   }

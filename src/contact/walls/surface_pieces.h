@@ -106,6 +106,7 @@ class SurfaceSearch {
   bool is_over(int number, const Vec3& x) const;
   bool in_cell(const MeshPatch::Cell& cell, const Vec3& x) const;
   void touch_face(int number);
+  void add_corners(int cell, std::vector<Vec3>* corners) const;
   bool passes_by(int number, const Vec3& deepest, double gap) const;
   bool add_plane(int number, int triangle, bool flat, double gap, const Vec3& on_body);
   int add(const SurfaceContact& c);
@@ -141,18 +142,20 @@ class SurfaceSearch {
   Vec3 into(const MeshPatch::Edge& e, int side) const;
   const SurfaceContact* contact_beside(const MeshPatch::Edge& e, int side, const Arc& arc, double low,
                                        double high) const;
+  static bool leads_in(const SurfaceContact* c, const MeshPatch::Edge& e, int side, const Arc& arc);
   void drop(const SurfaceContact* c, int other = -1);
   int instead_of(int contact) const;
   static bool deeper(const SurfaceContact* c, double gap);
   const std::vector<Stretch>& straight_on(int number);
   bool same_planes(const MeshPatch::Edge& a, const MeshPatch::Edge& b) const;
   bool is_on_line(int number) const;
-  bool meets(const Vec3& a, const Vec3& direction, double low, double high) const;
+  bool meets(const std::vector<Stretch>& line) const;
   void touch_outer_edge(int number, const Arc& arc, bool active);
   bool touch_outer_vertex(int number, const Vec3& guess);
 
   static constexpr double kNearVertex = 4;     // overlaps: contacts that a way out there may be shorter than
   static constexpr double kOneSide = 1e-9;     // rad: square to an edge
+  static constexpr double kBorder = 1e-7;      // rad, of the normals at a vertex
   static constexpr double kStanding = 0.5;     // of a standing feature's overlap: ways out shorter than that
   static constexpr double kLineLength = 1e-4;  // of the bounding radius: of a point there is less
   static constexpr double kStraightOn = 1 - 1e-12;  // cosine

@@ -311,18 +311,32 @@ bool SurfaceSearch::passes_by(int number, const Vec3& deepest, double gap) const
   const double slope = planes_[number].normal.dot(-deepest);
   if (slope > 0 && is_over(number, particle_.x + deepest + gap / slope * deepest)) return false;
   const MeshPatch::Plane& plane = patch_.planes()[number];
+  std::vector<Vec3>& corners = workspace().corners;
   bool over = false;
   for (int i = 0; i < plane.cells; ++i) {
-    const MeshPatch::Cell& cell = patch_.cells()[patch_.cell_in(plane.first + i)];
-    if (!in_cell(cell, particle_.x + deepest)) continue;
+    const int number = patch_.cell_in(plane.first + i);
+    if (!in_cell(patch_.cells()[number], particle_.x + deepest)) continue;
     over = true;
-    std::vector<Vec3>& corners = workspace().corners;
     corners.clear();
-    for (int k = cell.first; k < cell.first + cell.corners; ++k)
-      corners.push_back(patch_.vertices()[patch_.corner(k)].x);
-    if (!is_clear_of(particle_, corners.data(), cell.corners)) return false;
+    add_corners(number, &corners);
+    if (!is_clear_of(particle_, corners.data(), static_cast<int>(corners.size()))) return false;
+    // A sharp body may be in the wall by a neighbour, and meet the face nowhere.
+    const MeshPatch::Cell& cell = patch_.cells()[number];
+    for (int k = cell.first; k < cell.first + cell.corners; ++k) {
+      const MeshPatch::Edge& e = patch_.edges()[patch_.edge_of(k)];
+      if (e.inner || e.sides != 2) continue;
+      for (int s = e.first_side; s < e.first_side + 2; ++s)
+        if (patch_.side(s).cell != number) add_corners(patch_.side(s).cell, &corners);
+    }
+    if (!is_clear_of(particle_, corners.data(), static_cast<int>(corners.size()))) return false;
   }
   return over;
+}
+
+void SurfaceSearch::add_corners(int cell, std::vector<Vec3>* corners) const {
+  const MeshPatch::Cell& c = patch_.cells()[cell];
+  for (int k = c.first; k < c.first + c.corners; ++k)
+    corners->push_back(patch_.vertices()[patch_.corner(k)].x);
 }
 
 bool SurfaceSearch::add_plane(int number, int triangle, bool flat, double gap, const Vec3& on_body) {
