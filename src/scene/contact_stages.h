@@ -72,6 +72,7 @@ struct WallContact {
   bool face = false;
   std::optional<PlaneRegion> region;  // that a flat feature of the body stands on, until the end of the step
   std::uint64_t name = 0;             // of the piece of the wall
+  double flat = 0;                    // length by which planes may differ that are one to the body
   double path = 0;                    // of the body and the wall together, as Bodies::path
   PairMemory memory;
 };
@@ -275,6 +276,7 @@ class ContactStages {
     std::uint64_t name = 0;  // of the piece of the wall
     double level = 0;        // normal . wall's point
     double shift = 0;        // by which the wall stands back, length
+    double age = 0;          // of the body's unbroken contact with the wall, rad of its own oscillation
   };
   Partner& partner(std::int32_t number) { return partners_[number - 1]; }
   const Partner& partner(std::int32_t number) const { return partners_[number - 1]; }

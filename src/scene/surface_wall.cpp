@@ -13,6 +13,12 @@ namespace {
 constexpr double kMargin =
     0.2;  // of the bounding radius, between the body's sphere and triangles of no concern
 constexpr double kWeld = 1e-6;  // of the bounding radius: corners of a mesh this close are one
+// What of a body's overlap its flat faces make of a bent mesh's unevenness: below it the mesh is flat to them.
+// Bits of single precision that STL files round corners to would have them stand on points that come and go.
+constexpr double kFlatShare = 5e-2;
+constexpr double kMostFlat = 1e-4;       // of the bounding radius
+constexpr double kFlatKept = 2;          // a patch is not made again while it is as flat but for this factor ...
+constexpr double kFlatKeptBelow = 8;    // ... and this, where overlaps become less
 
 Triangle triangle_at(const double* nodes, int number) {
   Triangle t;
@@ -154,6 +160,7 @@ void SurfaceWall::find_for(int body, const ContactStages::Step& step,
     f.region.reset();
     f.moves = moves_;
     f.face = still_ && c.piece == SurfaceContact::face;
+    f.flat = kind_ == Kind::mesh ? patches_[patch_of_[body]]->flat : 0;
     if (c.flat) f.region = plane_region(patches_[patch_of_[body]]->mesh, c.plane, particle.x);
     f.path = step.bodies->path()[body] + path_;
     f.memory = c.memory;
@@ -210,6 +217,16 @@ void SurfaceWall::choose(const BodyRecord& body, int number, double path,
       patch->near.push_back(k);
 }
 
+// The length within which triangles are one plane to a body; that of its patch, if there is one and it will do.
+double SurfaceWall::flatness(const BodyRecord& body, const Shape& shape, const FormerContact* former,
+                             int count, const Patch* patch) const {
+  double overlap = 0;
+  for (int k = 0; k < count && edged(shape); ++k) overlap = std::max(overlap, former[k].overlap);
+  const double flat = std::clamp(kFlatShare * overlap, kWeld * body.radius, kMostFlat * body.radius);
+  const bool kept = patch && flat <= kFlatKept * patch->flat && flat >= patch->flat / kFlatKeptBelow;
+  return kept ? patch->flat : flat;
+}
+
 void SurfaceWall::gather(const Patch& patch, const std::vector<TriangleArray>& meshes) {
   triangles_.clear();
   for (const int k : patch.near)
@@ -234,11 +251,15 @@ void SurfaceWall::find_in_mesh(int body, const ContactStages::Step& step,
       patch.mesh.build_plane(origin_, axis_);
     else
       patch.mesh.move_plane(origin_, axis_);
-  } else if (made || path > patch.until) {
-    const BodyRecord& record = step.bodies->record(body);
+    return find_surface_contacts(particle, patch.mesh, step.settings, path, former, count, &contacts_);
+  }
+  const BodyRecord& record = step.bodies->record(body);
+  const double flat = flatness(record, *particle.shape, former, count, made ? nullptr : &patch);
+  if (made || path > patch.until || flat != patch.flat) {
     choose(record, body, path, meshes, &patch);
     gather(patch, meshes);
-    patch.mesh.build(triangles_.data(), static_cast<int>(triangles_.size()), kWeld * record.radius);
+    patch.flat = flat;
+    patch.mesh.build(triangles_.data(), static_cast<int>(triangles_.size()), kWeld * record.radius, flat);
   } else if (path_ > 0) {
     gather(patch, meshes);
     patch.mesh.move(triangles_.data());

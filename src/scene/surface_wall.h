@@ -70,9 +70,12 @@ class SurfaceWall {
     MeshPatch mesh;
     std::vector<int> near;  // numbers in near_
     double until = -kFarAway;
+    double flat = 0;  // length within which triangles are taken for one plane
   };
   void choose(const BodyRecord& body, int number, double path, const std::vector<TriangleArray>& meshes,
               Patch* patch) const;
+  double flatness(const BodyRecord& body, const Shape& shape, const FormerContact* former, int count,
+                  const Patch* patch) const;
   void gather(const Patch& patch, const std::vector<TriangleArray>& meshes);
   TubeSurvey* survey_of(int body, const Particle& particle);
   std::uint64_t name_of(const SurfaceContact& c, int body, const std::vector<TriangleArray>& meshes) const;

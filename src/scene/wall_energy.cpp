@@ -109,12 +109,13 @@ bool ContactStages::same_piece(std::int32_t number, int body, const WallContact&
   const Vec3 x = load(p.record.x), velocity = found.velocity + found.spin.cross(x - found.result.point_a);
   const Vec3& now = found.result.normal;
   const double radius = record(body).radius, level = now.dot(found.result.point_a);
+  const double same = kSamePlane * radius + found.flat;
   for (const double dt : {0.0, step_.dt}) {
     const double turned = dt * found.spin.norm(), way = dt * velocity.norm();
     const Vec3 moved = (normal + dt * found.spin.cross(normal)).normalized();
     const double moved_level = moved.dot(x + dt * velocity) + p.level - normal.dot(x);
-    if ((moved - now).norm() < kSamePlane + turned * turned &&
-        std::abs(level - moved_level) < (kSamePlane + turned * turned) * radius + kSameWay * way)
+    if (radius * (moved - now).norm() < same + turned * turned * radius &&
+        std::abs(level - moved_level) < same + turned * turned * radius + kSameWay * way)
       return true;
   }
   return false;
@@ -130,7 +131,7 @@ bool ContactStages::jumps(std::int32_t number, int body, const WallContact& foun
   if (state.active == 0) return false;
   const double way = step_.dt * ((load(b.velocity) - found.velocity).norm() +
                                  b.radius * (load(b.spin).norm() + found.spin.norm()));
-  return std::abs(-found.result.gap - p.shift - state.overlap) > kArrival * way + kSamePlane * b.radius;
+  return std::abs(-found.result.gap - p.shift - state.overlap) > kArrival * way + kSamePlane * b.radius + found.flat;
 }
 
 // Gives a contact an energy, by the wall's shift or its weight.
@@ -274,25 +275,30 @@ void ContactStages::balance_found(int body, WallContact* found, const std::int32
   for (int k = 0; k < count; ++k) stand_back(number[k], &found[k]);
 }
 
-// Under a body at rest the wall comes back.
+// Under a body at rest the wall comes back; under one that has been on it for long, whose contacts hand over
+// to each other without rest, as far as a shift is more than what is felt: they would pass it on and add to it,
+// and the body would sink.
 void ContactStages::stand_closer(std::int32_t number, int body, const ContactGeometry& g) {
   Partner& p = partner(number);
-  if (p.shift == 0) return;
   const ContactBlock& block = pool_.block(number);
   const int lane = ContactPool::lane(number);
-  double energy = 0, way = 0;
-  if (FlatContact* flat = pool_.flat(number)) {
-    const ContactRest rest = rest_of(*flat, flat->polygon.count, p.record, record(body));
-    if (!rest.rests) return;
-    way = kRelaxation * rest.phase * p.shift;
-    energy = polygon_energy(number, body, -way) - polygon_energy(number, body, 0);
-    flat->polygon.offset += way;
+  FlatContact* flat = pool_.flat(number);
+  ContactRest rest;
+  if (flat) {
+    rest = rest_of(*flat, flat->polygon.count, p.record, record(body));
   } else {
     ContactState state;
     block.get(lane, kStateField, kContactStateSize, &state);
-    const ContactRest rest = rest_of(state, p.record, record(body));
-    if (!rest.rests) return;
-    way = kRelaxation * rest.phase * p.shift;
+    rest = rest_of(state, p.record, record(body));
+  }
+  p.age += rest.phase;
+  if (p.shift == 0 || !(rest.rests || (p.age > kLasting && 2 * p.shift > g.overlap))) return;
+  const double way = kRelaxation * rest.phase * p.shift;
+  double energy = 0;
+  if (flat) {
+    energy = polygon_energy(number, body, -way) - polygon_energy(number, body, 0);
+    flat->polygon.offset += way;
+  } else {
     ContactGeometry before = g, after = g;
     before.overlap -= p.shift;
     after.overlap -= p.shift - way;

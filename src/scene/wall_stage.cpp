@@ -10,7 +10,7 @@ namespace nurbs {
 namespace {
 
 constexpr double kSameSide = 0.7;             // cosine between normals: 45 degrees
-constexpr int kListedSize = 16 + kProofSize;  // doubles of a listed contact beside its record: see pack_list
+constexpr int kListedSize = 17 + kProofSize;  // doubles of a listed contact beside its record: see pack_list
 
 // The whole periods in a way; each has no component along the axes after its own.
 Vec3 periods_in(const Vec3 (&period)[3], Vec3 way) {
@@ -58,18 +58,25 @@ int ContactStages::former(std::int32_t head, FormerContact* contacts, PairMemory
   for (; head != 0 && count < kMostListed; head = partner(head).next) {
     const ContactBlock& block = pool_.blocks()[(head - 1) / kBlock];
     const int lane = ContactPool::lane(head);
-    double normal[3];
-    block.get(lane, kStateField + 3, 3, normal);
+    ContactState state;
+    block.get(lane, kStateField, kContactStateSize, &state);
     PairMemory& m = memories[count];
     FormerContact& c = contacts[count++];
-    c = {load(normal), &m, false};
+    c = {load(state.normal), &m, false};
+    c.overlap = state.active != 0 ? state.overlap : 0;
     if (const FlatContact* flat = pool_.flat_of(block, lane)) {
       c.flat = true;
+      for (int k = 0; k < flat->polygon.count; ++k) {
+        ContactState point;
+        flat->points.get(k, kStateField, kContactStateSize, &point);
+        if (point.active != 0) c.overlap = std::max(c.overlap, point.overlap);
+      }
       c.polygon = &flat->polygon;
       c.until = flat->points.until[0];
       c.normal = load(c.polygon->normal);
       c.frame = load(partner(head).record.x);
     }
+    c.overlap += partner(head).shift;
     m.proof = partner(head).proof;
     block.get(lane, kLocalModelSize, 10, &m.on_a);
     block.get(lane, 0, kLocalModelSize, &m.model);
@@ -211,6 +218,8 @@ void ContactStages::give(int body, std::int32_t* head, WallContact* found, int c
   std::int32_t number[kMostListed] = {};
   pair_up(body, former, formers, found, count, balanced, number);
 
+  double age = 0;
+  for (int i = 0; i < formers; ++i) age = std::max(age, partner(former[i].number).age);
   bool known[kMostListed];
   for (int k = 0; k < count; ++k) {
     known[k] = number[k] != 0;
@@ -218,6 +227,7 @@ void ContactStages::give(int body, std::int32_t* head, WallContact* found, int c
     const WallContact& f = found[k];
     number[k] = add_listed({f.memory.model, f.memory.on_a, f.memory.on_b, {}, {0, 0, 0}, 1, 0});
     store(f.result.point_a, partner(number[k]).record.x);
+    partner(number[k]).age = age;
     bind_listed(number[k], body);
   }
   if (balanced) {
@@ -346,7 +356,8 @@ int ContactStages::pack_list(std::int32_t head, double* to) const {
     to[m + 9] = p.shift;
     std::memcpy(to + m + 10, p.record.velocity, 3 * sizeof(double));
     std::memcpy(to + m + 13, p.record.spin, 3 * sizeof(double));
-    std::memcpy(to + m + 16, &p.proof, sizeof p.proof);
+    to[m + 16] = p.age;
+    std::memcpy(to + m + 17, &p.proof, sizeof p.proof);
     m += kListedSize;
     m += pool_.pack(head, to + m);
   }
@@ -373,7 +384,8 @@ std::int32_t ContactStages::unpack_list(const double* from, int* size) {
     std::memcpy(p.record.velocity, values + 10, 3 * sizeof(double));
     std::memcpy(p.record.spin, values + 13, 3 * sizeof(double));
     std::memcpy(p.record.spin_before, values + 13, 3 * sizeof(double));
-    std::memcpy(&p.proof, values + 16, sizeof p.proof);
+    p.age = values[16];
+    std::memcpy(&p.proof, values + 17, sizeof p.proof);
     p.proof.contact = number;
     if (last == 0)
       first = number;

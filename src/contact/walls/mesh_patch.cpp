@@ -17,14 +17,15 @@ double longest_side2(const Triangle& t) {
 
 // Twice the area over the squared longest side: below this a triangle has no plane of its own.
 constexpr double kNoArea = 1e-12;
+constexpr double kSamePlane = 1e-3;  // of the distance within which corners are one: planes are, at least
 
 }  // namespace
 
-void MeshPatch::build(const Triangle* triangles, int count, double distance) {
+void MeshPatch::build(const Triangle* triangles, int count, double distance, double flat) {
   unbounded_ = false;
   weld(triangles, count, distance);
   split_sides(distance);
-  find_planes(triangles, 1e-3 * distance);
+  find_planes(triangles, std::max(flat, kSamePlane * distance));
   find_edges();
   link_vertices();
   place();

@@ -54,8 +54,9 @@ class MeshPatch {
   };
 
   // From triangles in an order that does not depend on ranks; corners closer than `weld` (length) are one.
-  // Triangles without area are left out. O(n^2) in the number of triangles.
-  void build(const Triangle* triangles, int count, double weld);
+  // Triangles without area are left out. Triangles within `flat` (length) of a larger one's plane lie in it.
+  // O(n^2) in the number of triangles.
+  void build(const Triangle* triangles, int count, double weld, double flat = 0);
   // A single plane without bounds.
   void build_plane(const Vec3& origin, const Vec3& normal);
   // The same triangles somewhere else.
