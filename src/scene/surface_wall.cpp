@@ -13,12 +13,13 @@ namespace {
 constexpr double kMargin =
     0.2;  // of the bounding radius, between the body's sphere and triangles of no concern
 constexpr double kWeld = 1e-6;  // of the bounding radius: corners of a mesh this close are one
-// What of a body's overlap its flat faces make of a bent mesh's unevenness: below it the mesh is flat to them.
-// Bits of single precision that STL files round corners to would have them stand on points that come and go.
+// What of a body's overlap its flat faces make of a bent mesh's unevenness: below it the mesh is flat to
+// them. Bits of single precision that STL files round corners to would have them stand on points that come
+// and go.
 constexpr double kFlatShare = 5e-2;
-constexpr double kMostFlat = 1e-4;       // of the bounding radius
-constexpr double kFlatKept = 2;          // a patch is not made again while it is as flat but for this factor ...
-constexpr double kFlatKeptBelow = 8;    // ... and this, where overlaps become less
+constexpr double kMostFlat = 1e-4;    // of the bounding radius
+constexpr double kFlatKept = 2;       // a patch is not made again while it is as flat but for this factor ...
+constexpr double kFlatKeptBelow = 8;  // ... and this, where overlaps become less
 
 Triangle triangle_at(const double* nodes, int number) {
   Triangle t;
@@ -217,14 +218,14 @@ void SurfaceWall::choose(const BodyRecord& body, int number, double path,
       patch->near.push_back(k);
 }
 
-// The length within which triangles are one plane to a body; that of its patch, if there is one and it will do.
-double SurfaceWall::flatness(const BodyRecord& body, const Shape& shape, const FormerContact* former,
-                             int count, const Patch* patch) const {
+// The length within which triangles are one plane to a body that overlaps as it was found to; that of its
+// patch, if it will do.
+double SurfaceWall::flatness(const BodyRecord& body, const Shape& shape, const Patch& patch) const {
   double overlap = 0;
-  for (int k = 0; k < count && edged(shape); ++k) overlap = std::max(overlap, former[k].overlap);
+  for (int k = 0; k < contacts_.count && edged(shape); ++k)
+    overlap = std::max(overlap, -contacts_.contact[k].gap);
   const double flat = std::clamp(kFlatShare * overlap, kWeld * body.radius, kMostFlat * body.radius);
-  const bool kept = patch && flat <= kFlatKept * patch->flat && flat >= patch->flat / kFlatKeptBelow;
-  return kept ? patch->flat : flat;
+  return flat <= kFlatKept * patch.flat && flat >= patch.flat / kFlatKeptBelow ? patch.flat : flat;
 }
 
 void SurfaceWall::gather(const Patch& patch, const std::vector<TriangleArray>& meshes) {
@@ -254,17 +255,25 @@ void SurfaceWall::find_in_mesh(int body, const ContactStages::Step& step,
     return find_surface_contacts(particle, patch.mesh, step.settings, path, former, count, &contacts_);
   }
   const BodyRecord& record = step.bodies->record(body);
-  const double flat = flatness(record, *particle.shape, former, count, made ? nullptr : &patch);
-  if (made || path > patch.until || flat != patch.flat) {
-    choose(record, body, path, meshes, &patch);
-    gather(patch, meshes);
+  const auto build = [&](double flat) {
     patch.flat = flat;
     patch.mesh.build(triangles_.data(), static_cast<int>(triangles_.size()), kWeld * record.radius, flat);
+  };
+  const bool anew = made || path > patch.until;
+  if (anew) {
+    choose(record, body, path, meshes, &patch);
+    gather(patch, meshes);
+    build(made ? kWeld * record.radius : patch.flat);
   } else if (path_ > 0) {
     gather(patch, meshes);
     patch.mesh.move(triangles_.data());
   }
   find_surface_contacts(particle, patch.mesh, step.settings, path, former, count, &contacts_);
+  if (const double flat = flatness(record, *particle.shape, patch); flat != patch.flat) {
+    if (!anew) gather(patch, meshes);
+    build(flat);
+    find_surface_contacts(particle, patch.mesh, step.settings, path, former, count, &contacts_);
+  }
   contacts_.expiry = std::min(contacts_.expiry, patch.until);
 }
 

@@ -74,8 +74,7 @@ class SurfaceWall {
   };
   void choose(const BodyRecord& body, int number, double path, const std::vector<TriangleArray>& meshes,
               Patch* patch) const;
-  double flatness(const BodyRecord& body, const Shape& shape, const FormerContact* former, int count,
-                  const Patch* patch) const;
+  double flatness(const BodyRecord& body, const Shape& shape, const Patch& patch) const;
   void gather(const Patch& patch, const std::vector<TriangleArray>& meshes);
   TubeSurvey* survey_of(int body, const Particle& particle);
   std::uint64_t name_of(const SurfaceContact& c, int body, const std::vector<TriangleArray>& meshes) const;

@@ -131,7 +131,8 @@ bool ContactStages::jumps(std::int32_t number, int body, const WallContact& foun
   if (state.active == 0) return false;
   const double way = step_.dt * ((load(b.velocity) - found.velocity).norm() +
                                  b.radius * (load(b.spin).norm() + found.spin.norm()));
-  return std::abs(-found.result.gap - p.shift - state.overlap) > kArrival * way + kSamePlane * b.radius + found.flat;
+  return std::abs(-found.result.gap - p.shift - state.overlap) >
+         kArrival * way + kSamePlane * b.radius + found.flat;
 }
 
 // Gives a contact an energy, by the wall's shift or its weight.
@@ -276,8 +277,8 @@ void ContactStages::balance_found(int body, WallContact* found, const std::int32
 }
 
 // Under a body at rest the wall comes back; under one that has been on it for long, whose contacts hand over
-// to each other without rest, as far as a shift is more than what is felt: they would pass it on and add to it,
-// and the body would sink.
+// to each other without rest, as far as a shift is more than what is felt: they would pass it on and add to
+// it, and the body would sink.
 void ContactStages::stand_closer(std::int32_t number, int body, const ContactGeometry& g) {
   Partner& p = partner(number);
   const ContactBlock& block = pool_.block(number);

@@ -58,25 +58,18 @@ int ContactStages::former(std::int32_t head, FormerContact* contacts, PairMemory
   for (; head != 0 && count < kMostListed; head = partner(head).next) {
     const ContactBlock& block = pool_.blocks()[(head - 1) / kBlock];
     const int lane = ContactPool::lane(head);
-    ContactState state;
-    block.get(lane, kStateField, kContactStateSize, &state);
+    double normal[3];
+    block.get(lane, kStateField + 3, 3, normal);
     PairMemory& m = memories[count];
     FormerContact& c = contacts[count++];
-    c = {load(state.normal), &m, false};
-    c.overlap = state.active != 0 ? state.overlap : 0;
+    c = {load(normal), &m, false};
     if (const FlatContact* flat = pool_.flat_of(block, lane)) {
       c.flat = true;
-      for (int k = 0; k < flat->polygon.count; ++k) {
-        ContactState point;
-        flat->points.get(k, kStateField, kContactStateSize, &point);
-        if (point.active != 0) c.overlap = std::max(c.overlap, point.overlap);
-      }
       c.polygon = &flat->polygon;
       c.until = flat->points.until[0];
       c.normal = load(c.polygon->normal);
       c.frame = load(partner(head).record.x);
     }
-    c.overlap += partner(head).shift;
     m.proof = partner(head).proof;
     block.get(lane, kLocalModelSize, 10, &m.on_a);
     block.get(lane, 0, kLocalModelSize, &m.model);

@@ -59,7 +59,6 @@ struct FormerContact {
   const ContactPolygon* polygon = nullptr;  // ... this one, if it is known, ...
   Vec3 frame = Vec3::Zero();                // ... with arms from this fixed point of the wall, ...
   double until = -kFarAway;                 // ... beside which the body touches nowhere before this path
-  double overlap = 0;                       // as it was
 };
 
 constexpr int kSurfaceContacts = 32;
