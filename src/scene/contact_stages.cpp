@@ -168,6 +168,7 @@ void ContactStages::check_stamps() {
     block.set(lane, 0, kLocalModelSize, &empty.model);
     block.set(lane, kLocalModelSize, 10, &empty.on_a);
     pool_.drop_flat(proof.contact);
+    forget_spheres(block, lane);
   }
 }
 

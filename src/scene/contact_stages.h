@@ -247,6 +247,7 @@ class ContactStages {
   double model_energy(const ContactBlock& block, int lane, const ContactGeometry& geometry);
   ModelContact model_contact(const ContactBlock& block, int lane, const ContactGeometry& geometry,
                              const ModelMemory& own) const;
+  void forget_spheres(ContactBlock& block, int lane);  // of a body that is another now
   SphereCurvatures model_curvatures(const ContactBlock& block, int lane,
                                     const ContactGeometry& geometry) const;
   void apply_model(ContactBlock& block, const Results& results);
@@ -268,6 +269,7 @@ class ContactStages {
     int mark = 0;
     bool seen = false;
     double body[3] = {};                // where the body was in the last step
+    double radius = 0;                  // of its bounding sphere, if it is known
     std::optional<PlaneRegion> region;  // of this step
     double path = 0;                    // of wall and body
     double normal[3] = {};              // of the face that the contact follows by itself, through record.x

@@ -55,6 +55,12 @@ SphereCurvatures ContactStages::model_curvatures(const ContactBlock& block, int 
   return sphere_curvatures(of_a, of_b, g.normal, cap, true);
 }
 
+void ContactStages::forget_spheres(ContactBlock& block, int lane) {
+  if (step_.model == nullptr) return;
+  ModelMemory& own = model_memory(block, lane);
+  own.curvature_a = own.curvature_b = 0;
+}
+
 void ContactStages::apply_model(ContactBlock& block, const Results& results) {
   for (int lane = 0; lane < kBlock; ++lane)
     if (results.touching[lane] != 0) ask_model(block, lane, results.geometry(lane), true);

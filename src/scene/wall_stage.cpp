@@ -94,6 +94,9 @@ void ContactStages::update_listed(std::int32_t number, int body, const WallConta
   store(load(step_.bodies->record(body).x), p.body);
   bind_listed(number, body);
   if (step_.bodies->reshaped()) pool_.forget_way(number);
+  const double radius = step_.bodies->record(body).radius;
+  if (p.radius != 0 && p.radius != radius) forget_spheres(block, lane);
+  p.radius = radius;
   if (FlatContact* flat = pool_.flat(number); flat && p.region) {  // the wall may have moved
     store(p.region->normal, flat->polygon.normal);
     flat->polygon.offset = p.region->normal.dot(p.region->origin - x);  // it stands back already

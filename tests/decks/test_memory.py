@@ -7,6 +7,8 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parent))
 import deck  # noqa: E402
+import meshes  # noqa: E402
+import models  # noqa: E402
 
 LAW = "kn 1e6 kt 5e5 mu 0.3"
 DECK = """
@@ -27,6 +29,29 @@ dump rows all local 1 rows.txt c_gaps[1] c_gaps[2] c_gaps[3]
 timestep 1e-6
 run 3
 {change}
+run 1
+"""
+
+HELD = """
+units si
+newton off
+communicate single vel yes
+boundary f f f
+atom_style nurbs ball.json
+read_data balls.data
+neighbor 0.05 bin
+neigh_modify delay 0
+{materials}
+pair_style gran/nurbs {law}
+pair_coeff * *
+{wall}
+fix hold all move linear 0 0 0 units box
+variable f atom abs(fz)
+compute f all reduce max v_f
+thermo_style custom step c_f
+timestep 1e-5
+run 100
+set group all diameter 0.22
 run 1
 """
 
@@ -61,6 +86,21 @@ class Size(unittest.TestCase):
                 f"pair_style gran/nurbs\npair_coeff * * {LAW}"
         gaps = self.gaps(1.99, 5.0, other)
         self.assertAlmostEqual(gaps[(1, 2)], -0.01, delta=1e-5)
+
+    def test_a_resized_body_has_its_own_effective_radius(self):
+        """Hertz's force of a ball held down on a wall and on another ball is that of its new radius at once."""
+        law = "model hertz tangential history"
+        modulus = 5e7 / (2 * (1 - 0.3**2))
+        floor = meshes.ascii_stl([(-1, -1, 0), (1, -1, 0), (1, 1, 0), (-1, 1, 0)], [(0, 1, 2), (0, 2, 3)])
+        for wall in (f"fix w all wall/nurbs plane 0 0 0 0 0 1 type 1 {law}",
+                     f"fix m all mesh/surface file floor.stl type 1\nfix w all wall/nurbs mesh m type 1 {law}", ""):
+            held = [(k + 1, 1, 1, 0.1, 2500.0, 0.0, 0.0, 0.099 + 0.198 * k, 1.0, 0.0, 0.0, 0.0) for k in range(1 if wall else 2)]
+            text = HELD.format(law=law, wall=wall, materials=models.materials(
+                {"youngsModulus": 5e7, "poissonsRatio": 0.3, "coefficientRestitution": 0.5, "coefficientFriction": 0.3}, types=1))
+            run = deck.run_ok(text, files={"ball.json": deck.shape_file("sphere", 1), "balls.data": deck.data_file(held), "floor.stl": floor})
+            overlap, radius = (0.011, 0.11) if wall else (0.022, 0.055)
+            force = 4 / 3 * modulus * radius**0.5 * overlap**1.5
+            self.assertAlmostEqual(run.thermo["f"][-1], force, delta=1e-6 * force, msg=wall)
 
 
 if __name__ == "__main__":
