@@ -1,13 +1,16 @@
 // The highest of f over the normals of a vertex; see find_highest_point_contact in feature_search.h.
 //
-// f is the least of the linear functions d . c over the body's points c (seen from the vertex), so that
-// supports at the corners of a spherical triangle bound it there: with d = x / |x|, x on the flat triangle,
+// f is the least of the linear functions d . c over the body's points c (seen from the vertex), concave but
+// for the length of d. Every support is one of them, so that some bound f on a spherical triangle: with
+// d = x / |x|, x on the flat triangle,
 //
-//     f(d) = f(x) / |x| <= max over x of the least x . c of the three supports,    while that is below zero,
+//     f(d) = f(x) / |x| <= max over x of the least x . c,    while that is below zero,
 //
-// which is highest at a corner, on a side where two functions meet, or inside where all three do. The highest
-// triangle is looked at there, and halved.
+// a linear program, whose answer is at a corner, on a side where two functions meet, or inside where three
+// do. The highest triangle is looked at there, which cuts its bound (Kelley 1960), and halved where that no
+// longer helps: what is left is then the length, a share of f of an eighth of the squared side.
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <vector>
 
@@ -17,9 +20,13 @@
 namespace nurbs {
 namespace {
 
-constexpr double kLevel = 1e-9;   // of the overlap: maxima that are one
-constexpr double kNone = 1e-12;   // sides of a cone that are next to nothing
-constexpr int kMostLooks = 2000;  // of which some 60 are needed
+constexpr double kLevel = 1e-9;  // of the overlap: maxima that are one ...
+constexpr double kSize = 1e-12;  // ... and of the bounding radius
+constexpr double kNone = 1e-12;  // sides of a cone that are next to nothing
+constexpr int kMostLooks = 400;  // of which some 60 are needed
+constexpr int kMostCuts = 6;
+constexpr double kProgress =
+    0.5;  // of a bound's way down to the best, by a cut after which no other is tried
 
 // A direction, the body's point there as seen from the vertex, and f.
 struct Look {
@@ -29,8 +36,10 @@ struct Look {
 
 struct Piece {
   int corner[3];
-  double bound;  // of f
-  Vec3 where;    // it is taken there, not unit
+  int cut[kMostCuts];  // looks whose supports bound f here, beside those of the corners
+  int cuts = 0;
+  double bound = 0;  // of f
+  Vec3 where;        // it is taken there, not unit
 };
 
 struct Room {
@@ -55,11 +64,18 @@ class ConeSearch {
     if (!cover(edges, count)) return clear();
     while (!pieces_.empty() && static_cast<int>(looks_.size()) < kMostLooks) {
       std::pop_heap(pieces_.begin(), pieces_.end(), lower);
-      const Piece top = pieces_.back();
+      Piece top = pieces_.back();
       pieces_.pop_back();
       const double best = best_ < 0 ? level : std::max(level, looks_[best_].at.gap);
-      if (!(top.bound > best + kLevel * std::abs(best) + noise())) break;
-      if (!look(top.where) || !halve(top)) return clear();
+      if (!(top.bound > best + kLevel * std::abs(best) + kSize * size_)) break;
+      if (!look(top.where)) return clear();
+      add_cut(&top);
+      const double before = top.bound, above = looks_[best_].at.gap;
+      bind(&top);
+      if (top.bound - above < kProgress * (before - above))
+        push(top);
+      else if (!halve(top))
+        return clear();
     }
     if (best_ < 0) return none;
     const Look& b = looks_[best_];
@@ -74,7 +90,6 @@ class ConeSearch {
 
  private:
   static bool lower(const Piece& p, const Piece& q) { return p.bound < q.bound; }
-  double noise() const { return kRoundoff * 8 * particle_.scale * particle_.shape->bounding_radius; }
 
   // The octants of the sphere as far as they lie in the cone, as triangles. False where the body is clear.
   bool cover(const Vec3* edges, int count) {
@@ -87,7 +102,8 @@ class ConeSearch {
       const int first = static_cast<int>(looks_.size()), corners = static_cast<int>(polygon.size());
       for (const Vec3& d : polygon)
         if (!look(d)) return false;
-      for (int k = 1; k + 1 < corners; ++k) add({{first, first + k, first + k + 1}, 0, Vec3::Zero()}, 0);
+      for (int k = 1; k + 1 < corners; ++k)
+        add(Piece{{first, first + k, first + k + 1}, {}, 0, kFarAway, Vec3::Zero()});
     }
     return true;
   }
@@ -139,54 +155,75 @@ class ConeSearch {
               r = piece.corner[(longest + 2) % 3];
     if (!look(looks_[p].d + looks_[q].d)) return false;
     const int middle = static_cast<int>(looks_.size()) - 1;
-    add({{p, middle, r}, 0, Vec3::Zero()}, piece.bound);
-    add({{middle, q, r}, 0, Vec3::Zero()}, piece.bound);
+    Piece half = piece;
+    for (const int end : {p, q}) {
+      std::copy_n(std::array<int, 3>{end, middle, r}.data(), 3, half.corner);
+      half.bound = piece.bound;
+      add(half);
+    }
     return true;
   }
 
-  // With its bound, which is no more than that of the piece it comes from.
-  void add(Piece piece, double bound) {
-    double m[3][3];  // support i at corner k
-    for (int i = 0; i < 3; ++i)
-      for (int k = 0; k < 3; ++k) m[i][k] = looks_[piece.corner[i]].c.dot(looks_[piece.corner[k]].d);
-    piece.bound = -kFarAway;
-    const auto offer = [&](double w0, double w1, double w2) {
-      double least = kFarAway;
-      for (const auto& row : m) least = std::min(least, w0 * row[0] + w1 * row[1] + w2 * row[2]);
-      if (!(least > piece.bound)) return;
-      piece.bound = least;
-      piece.where =
-          w0 * looks_[piece.corner[0]].d + w1 * looks_[piece.corner[1]].d + w2 * looks_[piece.corner[2]].d;
-    };
-    offer(1, 0, 0);
-    offer(0, 1, 0);
-    offer(0, 0, 1);
-    for (int i = 0; i < 3; ++i) {
-      const double *p = m[i], *q = m[(i + 1) % 3];
-      for (int k = 0; k < 3; ++k) {  // on the side from corner k
-        const int l = (k + 1) % 3;
-        const double from = p[k] - q[k], to = p[l] - q[l];
-        if (!(from * to < 0)) continue;
-        double w[3] = {0, 0, 0};
-        w[k] = to / (to - from);
-        w[l] = 1 - w[k];
-        offer(w[0], w[1], w[2]);
-      }
-    }
-    const Vec3 first(m[0][0] - m[1][0], m[0][1] - m[1][1], m[0][2] - m[1][2]);
-    const Vec3 second(m[0][0] - m[2][0], m[0][1] - m[2][1], m[0][2] - m[2][2]);
-    Vec3 w = first.cross(second);
-    if (w.sum() != 0) {
-      w /= w.sum();
-      if (w.minCoeff() > 0) offer(w[0], w[1], w[2]);
-    }
-    piece.bound = std::min(piece.bound, bound);
+  // The last look as a cut, in place of the oldest where there is no more room.
+  void add_cut(Piece* piece) const {
+    if (piece->cuts == kMostCuts) std::copy(piece->cut + 1, piece->cut + piece->cuts--, piece->cut);
+    piece->cut[piece->cuts++] = static_cast<int>(looks_.size()) - 1;
+  }
+
+  void add(Piece piece) {
+    bind(&piece);
+    push(piece);
+  }
+
+  void push(const Piece& piece) {
     pieces_.push_back(piece);
     std::push_heap(pieces_.begin(), pieces_.end(), lower);
   }
 
+  // The piece's bound, which is no more than it was.
+  void bind(Piece* piece) const {
+    constexpr int kMost = 3 + kMostCuts;
+    Vec3 m[kMost];  // of every support, at the three corners
+    const int count = 3 + piece->cuts;
+    for (int i = 0; i < count; ++i) {
+      const Vec3& c = looks_[i < 3 ? piece->corner[i] : piece->cut[i - 3]].c;
+      for (int k = 0; k < 3; ++k) m[i][k] = c.dot(looks_[piece->corner[k]].d);
+    }
+    double most = -kFarAway;
+    Vec3 at = Vec3::Zero();
+    const auto offer = [&](const Vec3& w) {
+      double least = kFarAway;
+      for (int i = 0; i < count && least > most; ++i) least = std::min(least, w.dot(m[i]));
+      if (least > most) most = least, at = w;
+    };
+    for (int k = 0; k < 3; ++k) offer(Vec3::Unit(k));
+    for (int i = 0; i < count; ++i)
+      for (int j = i + 1; j < count; ++j) {
+        const Vec3 apart = m[i] - m[j];
+        for (int k = 0; k < 3; ++k) {  // on the side from corner k
+          const double from = apart[k], to = apart[(k + 1) % 3];
+          if (!(from * to < 0)) continue;
+          Vec3 w = Vec3::Zero();
+          w[k] = to / (to - from);
+          w[(k + 1) % 3] = 1 - w[k];
+          offer(w);
+        }
+        for (int l = j + 1; l < count; ++l) {
+          Vec3 w = apart.cross(m[i] - m[l]);
+          const double sum = w.sum();
+          if (sum == 0) continue;
+          w /= sum;
+          if (w.minCoeff() > 0) offer(w);
+        }
+      }
+    piece->bound = std::min(piece->bound, most);
+    piece->where = Vec3::Zero();
+    for (int k = 0; k < 3; ++k) piece->where += at[k] * looks_[piece->corner[k]].d;
+  }
+
   const Particle& particle_;
   const Vec3 a_;
+  const double size_ = particle_.scale * particle_.shape->bounding_radius;
   std::vector<Look>& looks_;
   std::vector<Piece>& pieces_;
   Room& room_;
