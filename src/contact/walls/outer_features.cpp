@@ -187,6 +187,14 @@ bool SurfaceSearch::meets(const std::vector<Stretch>& line) const {
   return !is_clear_of(particle_, corners.data(), static_cast<int>(corners.size()));
 }
 
+// ... and at a vertex: that none of its normals parts them is true also of a vertex on the wall's far side.
+bool SurfaceSearch::meets(const MeshPatch::Vertex& v) const {
+  std::vector<Vec3>& corners = workspace().corners;
+  corners.clear();
+  for (int i = 0; i < v.cells; ++i) add_corners(patch_.cell_at(v.first_cell + i), &corners);
+  return !is_clear_of(particle_, corners.data(), static_cast<int>(corners.size()));
+}
+
 // An edge that stands out, with those that go straight on from it.
 void SurfaceSearch::touch_outer_edge(int number, const Arc& arc, bool active) {
   const MeshPatch::Edge& e = patch_.edges()[number];
@@ -282,7 +290,7 @@ bool SurfaceSearch::touch_outer_vertex(int number, const Vec3& guess) {
   int count = 0;
   bool touched = false;
   double most = -kFarAway;
-  std::vector<Vec3>& edges = workspace().corners;
+  std::vector<Vec3>& edges = workspace().ways;
   edges.clear();
   for (int i = 0; i < v.edges; ++i) {
     const MeshPatch::Edge& e = patch_.edges()[patch_.edge_at(v.first_edge + i)];
@@ -320,6 +328,7 @@ bool SurfaceSearch::touch_outer_vertex(int number, const Vec3& guess) {
       return e.dot(f.normal) <= -kBorder ||
              gap_along(particle_, v.x, (f.normal + 10 * kBorder * e).normalized(), &f.where).gap <= f.gap;
     });
+    own = own && f.gap > most && meets(v);
   }
   if (!f.touching) most = kFarAway;  // nor are its pieces, where a normal parts the body from all of them
   int best = -1;

@@ -57,7 +57,7 @@ struct Workspace {
   std::vector<MetEdge> edges;
   std::vector<int> active;
   std::vector<Stretch> line;
-  std::vector<Vec3> corners;
+  std::vector<Vec3> corners, ways;  // ways: of the edges at a vertex
 };
 Workspace& workspace();
 
@@ -150,6 +150,7 @@ class SurfaceSearch {
   bool same_planes(const MeshPatch::Edge& a, const MeshPatch::Edge& b) const;
   bool is_on_line(int number) const;
   bool meets(const std::vector<Stretch>& line) const;
+  bool meets(const MeshPatch::Vertex& v) const;
   void touch_outer_edge(int number, const Arc& arc, bool active);
   bool touch_outer_vertex(int number, const Vec3& guess);
 
