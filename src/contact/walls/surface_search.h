@@ -22,8 +22,9 @@
 // its deepest point, behind the plane by all its size and over the border by next to nothing, or not meet it
 // at all. At edges that stand out towards the body, and borders, the contact is then the highest of all
 // maxima over the normals that the wall has there, from one face's to the other's; at vertices all of whose
-// edges do, the shortest way out in any direction, if it is a normal of the wall. Contacts of the pieces
-// beside that are deeper are left out, and so are those of faces and edges that the body is clear of (GJK).
+// edges do, over the cone of normals there, where an interior one is highest. Contacts of the pieces beside
+// that are deeper are left out, as are those whose way out leads into the wall, and those of faces, edges and
+// vertices where the body is clear of the wall about them (GJK).
 #pragma once
 
 #include "contact/pair_memory.h"
