@@ -343,6 +343,22 @@ class UnevenFloors(unittest.TestCase):
             print(f"    slope {slope}: goes {gone:.6f} m on a plane, {way:.1e} m otherwise on the mesh, spin {spin:.1e}", flush=True)
             self.assertLess(way, 1e-2 * gone)
 
+    def test_two_sheets_that_should_be_one_are(self):
+        """Of two meshes, or one written twice: a ball and a box got twice the force from 1e-9 of their size apart on."""
+        sheet = [(-3, -3), (3, -3), (3, 3), (-3, 3)]
+        for shape, height in ((deck.shape_file("sphere", 0.5), 0.5), (None, HALF[2])):
+            ends = []
+            for below in (None, 0.0, 1e-8, 3e-7):
+                levels = [0.0] if below is None else [0.0, -below]
+                points = [(x, y, z) for z in levels for x, y in sheet]
+                faces = [(4 * k + a, 4 * k + b, 4 * k + c) for k in range(len(levels)) for a, b, c in ((0, 1, 2), (0, 2, 3))]
+                if below == 0.0:  # the host refuses a triangle that is there twice: the other diagonal
+                    faces[2:] = [(5, 6, 7), (5, 7, 4)]
+                r = run([atom(1, (0, 0, height + 0.02))], 8000, shape=shape, mesh=meshes.ascii_stl(points, faces))
+                ends.append([float(f["z"][0]) for _, f in r.dump("out.dump")])
+            for end in ends[1:]:
+                np.testing.assert_allclose(end, ends[0], rtol=0, atol=1e-6)
+
 
 class Rolling(unittest.TestCase):
     def bounce(self, spin, law, off=0.0):
