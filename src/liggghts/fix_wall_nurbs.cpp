@@ -33,6 +33,7 @@ namespace {
 
 constexpr int kPlaneArguments = 7;     // plane PX PY PZ NX NY NZ
 constexpr int kCylinderArguments = 5;  // cylinder x|y|z RADIUS C1 C2
+constexpr double kListFormat = 2;      // of a restart: counts on where what ContactStages::pack_list writes changes
 
 bool begins_law(const char* word) {
   for (const char* first : {"kn", "kt", "cn", "ct", "mu", "type", "model", "radius", "move"})
@@ -607,7 +608,7 @@ int FixWallNurbs::unpack_exchange(int i, double* buffer) {
 struct FixWallNurbs::Kept {
   double damping, friction;  // dissipated
   double time;               // of the motion
-  double listed, kind;
+  double format, kind;       // of the contacts: 0 one a body, else of lists (ContactStages::pack_list)
   double point[3], normal[3], radius;  // of a plane or cylinder: where it was
 };
 
@@ -616,7 +617,7 @@ void FixWallNurbs::write_restart(FILE* file) {
   double mine[2] = {done.damping, done.friction}, all[2] = {0, 0};
   MPI_Reduce(mine, all, 2, MPI_DOUBLE, MPI_SUM, 0, world);
   if (comm->me != 0) return;
-  Kept kept = {all[0], all[1], time_, listed() ? 1.0 : 0.0, static_cast<double>(kind_), {}, {}, radius_};
+  Kept kept = {all[0], all[1], time_, listed() ? kListFormat : 0.0, static_cast<double>(kind_), {}, {}, radius_};
   Vec3Map{kept.point} = motion_.point(origin_, time_);
   Vec3Map{kept.normal} = motion_.direction(normal_, time_);
   const int size = sizeof kept;
@@ -650,13 +651,13 @@ void FixWallNurbs::restart(char* buffer) {
   nurbs::EnergyLedger& done = stages_.dissipated();
   done = nurbs::EnergyLedger{};
   time_ = last_time_ = kept.time;
-  was_another_kind_ = (kept.listed != 0) != listed();
+  was_another_kind_ = kept.format != (listed() ? kListFormat : 0);
   if (was_another_kind_)
     nurbs_host::warn(
         FLERR, lmp,
         name_of(*this) +
             ": in the restart, the wall of this ID was of another kind (a plane at rest, or a moving "
-            "plane, cylinder or mesh); its contacts begin anew");
+            "plane, cylinder or mesh), or written by another version; its contacts begin anew");
   if (kind_ != Kind::mesh && static_cast<double>(kind_) == kept.kind) {
     const Vec3 edges = Vec3Map(domain->boxhi) - Vec3Map(domain->boxlo);
     const double way = way_since(kept);
