@@ -33,7 +33,8 @@ namespace {
 
 constexpr int kPlaneArguments = 7;     // plane PX PY PZ NX NY NZ
 constexpr int kCylinderArguments = 5;  // cylinder x|y|z RADIUS C1 C2
-constexpr double kListFormat = 2;      // of a restart: counts on where what ContactStages::pack_list writes changes
+constexpr double kListFormat =
+    2;  // of a restart: counts on where what ContactStages::pack_list writes changes
 
 bool begins_law(const char* word) {
   for (const char* first : {"kn", "kt", "cn", "ct", "mu", "type", "model", "radius", "move"})
@@ -617,7 +618,8 @@ void FixWallNurbs::write_restart(FILE* file) {
   double mine[2] = {done.damping, done.friction}, all[2] = {0, 0};
   MPI_Reduce(mine, all, 2, MPI_DOUBLE, MPI_SUM, 0, world);
   if (comm->me != 0) return;
-  Kept kept = {all[0], all[1], time_, listed() ? kListFormat : 0.0, static_cast<double>(kind_), {}, {}, radius_};
+  Kept kept = {all[0], all[1], time_,  listed() ? kListFormat : 0.0, static_cast<double>(kind_),
+               {},     {},     radius_};
   Vec3Map{kept.point} = motion_.point(origin_, time_);
   Vec3Map{kept.normal} = motion_.direction(normal_, time_);
   const int size = sizeof kept;

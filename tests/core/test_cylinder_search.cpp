@@ -106,8 +106,41 @@ TEST(CylinderSearch, contacts_inside_are_the_maxima_of_the_reach) {
   EXPECT_GE(several, 3);
 }
 
-// A ring of contacts is one contact, at round-off's place, whatever the body's poles do; beside the axis it
-// is where the body is.
+// Boxes along tubes far narrower than they are long: their edges, nearer to each other than a fiftieth of
+// their length, were taken for one, which was none of them.
+TEST(CylinderSearch, needles_in_narrow_tubes) {
+  Random random(8);
+  int several = 0;
+  for (const double wide : {0.3, 0.1, 0.03, 0.01, 0.003}) {
+    const auto needle = make_shape("needle", box(Vec3(1, wide, 0.8 * wide)));
+    for (int k = 0; k < 40; ++k) {
+      const Vec3 axis = random.direction(), origin = random.box(-1, 1);
+      const Quat along = Quat::FromTwoVectors(Vec3::UnitX(), axis);
+      Particle p{needle.get(), random.uniform(0.5, 2), Vec3::Zero(),
+                 Quat(Eigen::AngleAxisd(random.uniform(-M_PI, M_PI), axis)) * along};
+      Vec3 aside = 0.1 * wide * random.direction();
+      aside -= aside.dot(axis) * axis;
+      p.x = origin + random.uniform(-1, 1) * axis + p.scale * aside;
+      const double radius = random.uniform(1.15, 1.27) * wide * p.scale;
+      const SurfaceContacts found = find_from_scratch(p, origin, axis, radius);
+      int met = 0;
+      for (const double y : {-1.0, 1.0})
+        for (const double z : {-0.8, 0.8}) {
+          const double reach = (p.scale * (aside + p.q * Vec3(0, y * wide, z * wide))).norm();
+          if (!(reach > radius)) continue;
+          ++met;
+          double nearest = 1;
+          for (int i = 0; i < found.count; ++i)
+            nearest = std::min(nearest, std::abs(found.contact[i].gap - (radius - reach)));
+          EXPECT_LT(nearest, 1e-9 * p.scale) << wide << " " << k;
+        }
+      EXPECT_EQ(found.count, met) << wide << " " << k;
+      several += met > 1;
+    }
+  }
+  EXPECT_GT(several, 80);
+}
+
 TEST(CylinderSearch, a_round_body_on_the_axis_of_a_narrower_tube_has_one_contact) {
   Random random(8);
   const ShapePointer shapes[] = {sphere(), make_shape("tablet", rounded_cylinder(1, 0.4, 0.15)), disc(),

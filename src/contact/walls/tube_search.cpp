@@ -29,7 +29,11 @@ class Tube {
         u_(ahead.squaredNorm() > 0 ? Vec3((ahead - ahead.dot(pose.axis) * pose.axis).normalized())
                                    : pose.axis.unitOrthogonal()),
         v_(pose.axis.cross(u_)),
-        apart_(pose.apart) {}
+        apart_(pose.apart),
+        nearest_(kNearestOnWall * std::min(particle.scale * particle.shape->bounding_radius, pose.radius)) {}
+
+  // On the wall, of maxima that are not found as one.
+  double nearest() const { return nearest_; }
 
   Vec3 direction(double angle) const { return std::cos(angle) * u_ + std::sin(angle) * v_; }
   double angle(const Vec3& d) const { return std::atan2(d.dot(v_), d.dot(u_)); }
@@ -80,13 +84,13 @@ class Tube {
     return best;
   }
 
-  // Whether maxima between two directions are nearer than kNearestOnWall: where F' = 0 twice, rho - F sums to
+  // Whether maxima between two directions are nearer than nearest(): where F' = 0 twice, rho - F sums to
   // 0 in between, so that they are as far apart on the wall as the outline is long.
   bool is_short(const Reach& low, const Reach& high) const {
     const double width = high.angle - low.angle;
     if (!(width <= kNarrowArc)) return false;
     const Vec3 way = high.on_body - low.on_body, across = way - way.dot(axis_) * axis_;
-    return across.norm() <= 0.99 * kNearestOnWall * particle_.scale * particle_.shape->bounding_radius;
+    return across.norm() <= 0.99 * nearest_;
   }
 
   // Whether the body is more curved than `radius` between two directions, also after a turn of kSurveyRoom.
@@ -106,6 +110,7 @@ class Tube {
   const Particle& particle_;
   const Mat3 axes_;
   const Vec3 axis_, u_, v_, apart_;
+  const double nearest_;
 };
 
 // F is at most this between two directions less than pi apart: the support lines' corner, as F is sublinear.
@@ -287,9 +292,9 @@ class TubeSearch {
     if (k.contact.gap < 0) out_.add(surface_contact(k.contact, k.memory));
   }
 
-  // Maxima as near as kNearestOnWall have F fall by less than twice this between them, for F'' >= -F; so do
+  // Maxima as near as nearest() have F fall by less than twice this between them, for F'' >= -F; so do
   // those that come while F changes by less than this.
-  double still_room() const { return std::pow(kNearestOnWall * size_, 2) / (16 * pose_.radius); }
+  double still_room() const { return std::pow(tube_.nearest(), 2) / (16 * pose_.radius); }
 
   // Contacts where a survey leaves it open, of which `expected` are followed: its directions are looked at
   // again.
@@ -434,7 +439,7 @@ class TubeSearch {
   void sample(const Reach& low, const Reach& high) {
     const double width = high.angle - low.angle, ends = std::max(low.value, high.value),
                  most = most_between(low, high) * (1 + 1e-12) + kRingSupport * size_;
-    const double finest = std::max(kFinestRing, kNearestOnWall * size_ / pose_.radius);
+    const double finest = std::max(kFinestRing, tube_.nearest() / pose_.radius);
     const bool may = most > std::min(pose_.radius, 0.5 * (pose_.radius + ends));
     if (!(most > pose_.radius - room_) && !may) return push(high, kAway, most);
     if (tube_.round(low.angle, high.angle, pose_.radius - 2 * kSurveyRoom * size_))
