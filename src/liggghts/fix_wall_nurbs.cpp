@@ -33,8 +33,7 @@ namespace {
 
 constexpr int kPlaneArguments = 7;     // plane PX PY PZ NX NY NZ
 constexpr int kCylinderArguments = 5;  // cylinder x|y|z RADIUS C1 C2
-constexpr double kListFormat =
-    2;  // of a restart: counts on where what ContactStages::pack_list writes changes
+constexpr double kListFormat = 2;      // of restarts: counts on where ContactStages::pack_list changes
 
 bool begins_law(const char* word) {
   for (const char* first : {"kn", "kt", "cn", "ct", "mu", "type", "model", "radius", "move"})

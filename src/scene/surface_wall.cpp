@@ -246,13 +246,16 @@ void SurfaceWall::find_in_mesh(int body, const ContactStages::Step& step,
   }
   Patch& patch = *patches_[patch_of_[body]];
   const double path = step.bodies->path()[body] + path_;
+  const auto search = [&] {
+    find_surface_contacts(particle, patch.mesh, step.settings, path, former, count, &contacts_);
+  };
   if (kind_ == Kind::plane) {
     patch.until = kFarAway;
     if (made)
       patch.mesh.build_plane(origin_, axis_);
     else
       patch.mesh.move_plane(origin_, axis_);
-    return find_surface_contacts(particle, patch.mesh, step.settings, path, former, count, &contacts_);
+    return search();
   }
   const BodyRecord& record = step.bodies->record(body);
   const auto build = [&](double flat) {
@@ -268,11 +271,11 @@ void SurfaceWall::find_in_mesh(int body, const ContactStages::Step& step,
     gather(patch, meshes);
     patch.mesh.move(triangles_.data());
   }
-  find_surface_contacts(particle, patch.mesh, step.settings, path, former, count, &contacts_);
+  search();
   if (const double flat = flatness(record, *particle.shape, patch); flat != patch.flat) {
-    if (!anew) gather(patch, meshes);
+    if (!anew && path_ == 0) gather(patch, meshes);  // else they were
     build(flat);
-    find_surface_contacts(particle, patch.mesh, step.settings, path, former, count, &contacts_);
+    search();
   }
   contacts_.expiry = std::min(contacts_.expiry, patch.until);
 }

@@ -141,6 +141,8 @@ TEST(CylinderSearch, needles_in_narrow_tubes) {
   EXPECT_GT(several, 80);
 }
 
+// A ring of contacts is one contact, at round-off's place, whatever the body's poles do; beside the axis it
+// is where the body is.
 TEST(CylinderSearch, a_round_body_on_the_axis_of_a_narrower_tube_has_one_contact) {
   Random random(8);
   const ShapePointer shapes[] = {sphere(), make_shape("tablet", rounded_cylinder(1, 0.4, 0.15)), disc(),

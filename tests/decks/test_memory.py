@@ -11,14 +11,15 @@ import meshes  # noqa: E402
 import models  # noqa: E402
 
 LAW = "kn 1e6 kt 5e5 mu 0.3"
-DECK = """
+HEAD = """
 units si
 newton off
 communicate single vel yes
 boundary f f f
 atom_style nurbs ball.json
 read_data balls.data
-neighbor 0.4 bin
+"""
+DECK = HEAD + """neighbor 0.4 bin
 neigh_modify delay 0
 pair_style gran/nurbs
 pair_coeff * * {law}
@@ -32,14 +33,7 @@ run 3
 run 1
 """
 
-HELD = """
-units si
-newton off
-communicate single vel yes
-boundary f f f
-atom_style nurbs ball.json
-read_data balls.data
-neighbor 0.05 bin
+HELD = HEAD + """neighbor 0.05 bin
 neigh_modify delay 0
 {materials}
 pair_style gran/nurbs {law}

@@ -25,8 +25,7 @@ constexpr double kSize = 1e-12;  // ... and of the bounding radius
 constexpr double kNone = 1e-12;  // sides of a cone that are next to nothing
 constexpr int kMostLooks = 400;  // of which some 60 are needed
 constexpr int kMostCuts = 6;
-constexpr double kProgress =
-    0.5;  // of a bound's way down to the best, by a cut after which no other is tried
+constexpr double kProgress = 0.5;  // of a bound's way down to the best, that a cut must make for another
 
 // A direction, the body's point there as seen from the vertex, and f.
 struct Look {
@@ -35,7 +34,7 @@ struct Look {
 };
 
 struct Piece {
-  int corner[3];
+  std::array<int, 3> corner;
   int cut[kMostCuts];  // looks whose supports bound f here, beside those of the corners
   int cuts = 0;
   double bound = 0;  // of f
@@ -58,34 +57,27 @@ class ConeSearch {
   }
 
   FeatureContact run(const Vec3* edges, int count, double level) {
-    FeatureContact none;
-    none.touching = true;
-    none.gap = -kFarAway;
-    if (!cover(edges, count)) return clear();
+    if (!cover(edges, count)) return last();
     while (!pieces_.empty() && static_cast<int>(looks_.size()) < kMostLooks) {
       std::pop_heap(pieces_.begin(), pieces_.end(), lower);
       Piece top = pieces_.back();
       pieces_.pop_back();
       const double best = best_ < 0 ? level : std::max(level, looks_[best_].at.gap);
       if (!(top.bound > best + kLevel * std::abs(best) + kSize * size_)) break;
-      if (!look(top.where)) return clear();
+      if (!look(top.where)) return last();
       add_cut(&top);
       const double before = top.bound, above = looks_[best_].at.gap;
       bind(&top);
       if (top.bound - above < kProgress * (before - above))
         push(top);
       else if (!halve(top))
-        return clear();
+        return last();
     }
-    if (best_ < 0) return none;
-    const Look& b = looks_[best_];
-    FeatureContact c;
-    c.touching = true;
-    c.gap = b.at.gap;
-    c.normal = b.d;
-    c.on_body = b.at.on_body;
-    c.where = b.at.where;
-    return c;
+    if (best_ >= 0) return feature_contact(looks_[best_].at, looks_[best_].d);
+    FeatureContact none;
+    none.touching = true;
+    none.gap = -kFarAway;
+    return none;
   }
 
  private:
@@ -103,7 +95,7 @@ class ConeSearch {
       for (const Vec3& d : polygon)
         if (!look(d)) return false;
       for (int k = 1; k + 1 < corners; ++k)
-        add(Piece{{first, first + k, first + k + 1}, {}, 0, kFarAway, Vec3::Zero()});
+        add(Piece{{{first, first + k, first + k + 1}}, {}, 0, kFarAway, Vec3::Zero()});
     }
     return true;
   }
@@ -136,12 +128,7 @@ class ConeSearch {
     return l.at.gap < 0;
   }
 
-  FeatureContact clear() const {
-    FeatureContact c;
-    c.gap = looks_.back().at.gap;
-    c.normal = looks_.back().d;
-    return c;
-  }
+  FeatureContact last() const { return feature_contact(looks_.back().at, looks_.back().d); }
 
   // Its longest side is cut in two.
   bool halve(const Piece& piece) {
@@ -155,10 +142,9 @@ class ConeSearch {
               r = piece.corner[(longest + 2) % 3];
     if (!look(looks_[p].d + looks_[q].d)) return false;
     const int middle = static_cast<int>(looks_.size()) - 1;
-    Piece half = piece;
     for (const int end : {p, q}) {
-      std::copy_n(std::array<int, 3>{end, middle, r}.data(), 3, half.corner);
-      half.bound = piece.bound;
+      Piece half = piece;
+      half.corner = {end, middle, r};
       add(half);
     }
     return true;
@@ -166,7 +152,10 @@ class ConeSearch {
 
   // The last look as a cut, in place of the oldest where there is no more room.
   void add_cut(Piece* piece) const {
-    if (piece->cuts == kMostCuts) std::copy(piece->cut + 1, piece->cut + piece->cuts--, piece->cut);
+    if (piece->cuts == kMostCuts) {
+      std::copy(piece->cut + 1, piece->cut + kMostCuts, piece->cut);
+      --piece->cuts;
+    }
     piece->cut[piece->cuts++] = static_cast<int>(looks_.size()) - 1;
   }
 

@@ -17,16 +17,6 @@
 namespace nurbs {
 namespace {
 
-FeatureContact contact(const FeatureGap& at, const Vec3& d) {
-  FeatureContact c;
-  c.touching = at.gap < 0;
-  c.gap = at.gap;
-  c.normal = d;
-  c.on_body = at.on_body;
-  c.where = at.where;
-  return c;
-}
-
 // A direction of the search on a line: d, f there, and f's slope when d turns towards `high`.
 struct Turned {
   double angle;
@@ -262,7 +252,7 @@ class LineSearch {
   }
 
   FeatureContact between(const Turned& best, const Turned& low, const Turned& high) const {
-    FeatureContact c = contact(best.at, best.d);
+    FeatureContact c = feature_contact(best.at, best.d);
     // Their own slopes are those of their own directions, which a kink found early leaves apart.
     const double to_low = slope_at(best.angle, low.at), to_high = slope_at(best.angle, high.at);
     if (to_low > 0 && to_high < 0)
@@ -294,7 +284,7 @@ bool find_foot(const Particle& particle, const Vec3& a, Vec3 d, const SurfacePoi
   const double size = particle.scale * particle.shape->bounding_radius;
   FeatureGap g = gap_along(particle, a, d, start);
   const auto end = [&] {
-    *out = contact(g, d);
+    *out = feature_contact(g, d);
     return true;
   };
   for (int k = 0; k < kPointNewton; ++k) {
@@ -386,6 +376,16 @@ FeatureGap gap_along(const Particle& particle, const Vec3& a, const Vec3& d, con
   g.gap = d.dot(particle.x - a) - particle.scale * s.h;
   g.where = s.where;
   return g;
+}
+
+FeatureContact feature_contact(const FeatureGap& at, const Vec3& d) {
+  FeatureContact c;
+  c.touching = at.gap < 0;
+  c.gap = at.gap;
+  c.normal = d;
+  c.on_body = at.on_body;
+  c.where = at.where;
+  return c;
 }
 
 Arc arc_between(const Vec3& low, const Vec3& high) {

@@ -78,5 +78,7 @@ struct FeatureGap {
   SurfacePoint where;
 };
 FeatureGap gap_along(const Particle& particle, const Vec3& a, const Vec3& d, const SurfacePoint* start);
+// The contact that it is, were f highest there.
+FeatureContact feature_contact(const FeatureGap& at, const Vec3& d);
 
 }  // namespace nurbs

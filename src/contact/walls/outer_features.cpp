@@ -184,7 +184,7 @@ bool SurfaceSearch::meets(const std::vector<Stretch>& line) const {
     const MeshPatch::Edge& e = patch_.edges()[piece.edge];
     for (int i = e.first_side; i < e.first_side + e.sides; ++i) add_corners(patch_.side(i).cell, &corners);
   }
-  return !is_clear_of(particle_, corners.data(), static_cast<int>(corners.size()));
+  return !misses(corners);
 }
 
 // ... and at a vertex: that none of its normals parts them is true also of a vertex on the wall's far side.
@@ -192,7 +192,7 @@ bool SurfaceSearch::meets(const MeshPatch::Vertex& v) const {
   std::vector<Vec3>& corners = workspace().corners;
   corners.clear();
   for (int i = 0; i < v.cells; ++i) add_corners(patch_.cell_at(v.first_cell + i), &corners);
-  return !is_clear_of(particle_, corners.data(), static_cast<int>(corners.size()));
+  return !misses(corners);
 }
 
 // An edge that stands out, with those that go straight on from it.
@@ -321,14 +321,14 @@ bool SurfaceSearch::touch_outer_vertex(int number, const Vec3& guess) {
   const SurfacePoint* from = point_for(guess, &start);
   FeatureContact f;
   bool own = find_only_way_out(particle_, v.x, guess, from, &f);
-  if (own ? !f.touching && !is_normal(f.normal) : true) {
+  if (!own || (!f.touching && !is_normal(f.normal))) {
     f = find_highest_point_contact(particle_, v.x, edges.data(), v.edges, most, from);
     // Where f is highest at the border of the normals and goes on to rise, an edge has the contact.
-    own = std::all_of(edges.begin(), edges.end(), [&](const Vec3& e) {
-      return e.dot(f.normal) <= -kBorder ||
-             gap_along(particle_, v.x, (f.normal + 10 * kBorder * e).normalized(), &f.where).gap <= f.gap;
-    });
-    own = own && f.gap > most && meets(v);
+    const auto goes_on = [&](const Vec3& e) {
+      return e.dot(f.normal) > -kBorder &&
+             gap_along(particle_, v.x, (f.normal + 10 * kBorder * e).normalized(), &f.where).gap > f.gap;
+    };
+    own = f.touching && f.gap > most && std::none_of(edges.begin(), edges.end(), goes_on) && meets(v);
   }
   if (!f.touching) most = kFarAway;  // nor are its pieces, where a normal parts the body from all of them
   int best = -1;

@@ -107,6 +107,7 @@ class SurfaceSearch {
   bool in_cell(const MeshPatch::Cell& cell, const Vec3& x) const;
   void touch_face(int number);
   void add_corners(int cell, std::vector<Vec3>* corners) const;
+  bool misses(const std::vector<Vec3>& corners) const;
   bool passes_by(int number, const Vec3& deepest, double gap) const;
   bool add_plane(int number, int triangle, bool flat, double gap, const Vec3& on_body);
   int add(const SurfaceContact& c);

@@ -314,21 +314,21 @@ bool SurfaceSearch::passes_by(int number, const Vec3& deepest, double gap) const
   std::vector<Vec3>& corners = workspace().corners;
   bool over = false;
   for (int i = 0; i < plane.cells; ++i) {
-    const int number = patch_.cell_in(plane.first + i);
-    if (!in_cell(patch_.cells()[number], particle_.x + deepest)) continue;
+    const int here = patch_.cell_in(plane.first + i);
+    const MeshPatch::Cell& cell = patch_.cells()[here];
+    if (!in_cell(cell, particle_.x + deepest)) continue;
     over = true;
     corners.clear();
-    add_corners(number, &corners);
-    if (!is_clear_of(particle_, corners.data(), static_cast<int>(corners.size()))) return false;
+    add_corners(here, &corners);
+    if (!misses(corners)) return false;
     // A sharp body may be in the wall by a neighbour, and meet the face nowhere.
-    const MeshPatch::Cell& cell = patch_.cells()[number];
     for (int k = cell.first; k < cell.first + cell.corners; ++k) {
       const MeshPatch::Edge& e = patch_.edges()[patch_.edge_of(k)];
       if (e.inner || e.sides != 2) continue;
       for (int s = e.first_side; s < e.first_side + 2; ++s)
-        if (patch_.side(s).cell != number) add_corners(patch_.side(s).cell, &corners);
+        if (patch_.side(s).cell != here) add_corners(patch_.side(s).cell, &corners);
     }
-    if (!is_clear_of(particle_, corners.data(), static_cast<int>(corners.size()))) return false;
+    if (!misses(corners)) return false;
   }
   return over;
 }
@@ -337,6 +337,11 @@ void SurfaceSearch::add_corners(int cell, std::vector<Vec3>* corners) const {
   const MeshPatch::Cell& c = patch_.cells()[cell];
   for (int k = c.first; k < c.first + c.corners; ++k)
     corners->push_back(patch_.vertices()[patch_.corner(k)].x);
+}
+
+// Whether a direction parts the body from the hull of some corners.
+bool SurfaceSearch::misses(const std::vector<Vec3>& corners) const {
+  return is_clear_of(particle_, corners.data(), static_cast<int>(corners.size()));
 }
 
 bool SurfaceSearch::add_plane(int number, int triangle, bool flat, double gap, const Vec3& on_body) {
