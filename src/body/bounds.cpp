@@ -43,7 +43,7 @@ Field signed_distance(const BezierPatch& patch, double sign) {
   return f;
 }
 
-std::pair<Field, Field> halve(Field f, bool in_u) {
+std::pair<Field, Field> halve_field(Field f, bool in_u) {
   Field g = f;
   halve_net(f.num.data(), g.num.data(), f.m, f.n, in_u);
   halve_net(f.den.data(), g.den.data(), f.m, f.n, in_u);
@@ -85,7 +85,7 @@ double bound_squared(const std::vector<BezierPatch>& patches, double sign) {
     const Field& worst = open.top();
     if (worst.upper - reached <= kBoundWidth * std::abs(reached)) break;
     const bool in_u = bends_more_in_u(worst);
-    auto [f, g] = halve(worst, in_u);
+    auto [f, g] = halve_field(worst, in_u);
     open.pop();
     reached = std::max({reached, corner_value(f), corner_value(g)});
     open.push(std::move(f));
@@ -134,7 +134,7 @@ bool lies_outside_unit_ball(const BezierPatch& patch, double slack) {
     if (worst.upper <= slack) continue;
     if (split == kMostOutside || corner_value(worst) > slack) return false;
     const bool in_u = bends_more_in_u(worst);
-    auto [f, g] = halve(std::move(worst), in_u);
+    auto [f, g] = halve_field(std::move(worst), in_u);
     open.push_back(std::move(f));
     open.push_back(std::move(g));
   }

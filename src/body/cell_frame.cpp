@@ -1,13 +1,10 @@
 #include "body/cell_frame.h"
 
 #include <cmath>
-#include <limits>
 #include <utility>
 
 namespace nurbs::cells {
 namespace {
-
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 Section section(const Cell& c, bool in_v, bool backwards) {
   const double low = in_v ? c.v0 : c.u0, high = low + (in_v ? c.dv : c.du);

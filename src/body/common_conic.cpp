@@ -12,12 +12,12 @@ namespace nurbs {
 namespace {
 
 constexpr double kNone = std::numeric_limits<double>::infinity();
-constexpr int kPoints = 9;        // of each curve, that the conic is fitted to
-constexpr int kHalvings = 4;      // of a curve, in pieces
-constexpr double kWay = 0.5;      // cosine between a derivative and its piece's direction, at least ...
-constexpr double kTilt = 0.5;     // ... and between the gradient and that, at most
-constexpr double kSameWay = 0.1;  // of the curve's extent: apart by less, both go the same way round
-constexpr double kNewton = 0.25;  // of what the gradient's bound allows
+constexpr int kPoints = 9;         // of each curve, that the conic is fitted to
+constexpr int kConicHalvings = 4;  // of a curve, in pieces
+constexpr double kWay = 0.5;       // cosine between a derivative and its piece's direction, at least ...
+constexpr double kTilt = 0.5;      // ... and between the gradient and that, at most
+constexpr double kSameWay = 0.1;   // of the curve's extent: apart by less, both go the same way round
+constexpr double kNewton = 0.25;   // of what the gradient's bound allows
 
 using Scalars = Bernstein<double>;
 
@@ -34,9 +34,9 @@ Conic fit(const std::vector<Vec3>& points) {
 }
 
 // The coordinates of homogeneous points in the plane's axes, as polynomials.
-struct Plane {
+struct PlaneCurve {
   Scalars x, y, z, w;
-  explicit Plane(const Homogeneous& curve) : w(weights(curve)) {
+  explicit PlaneCurve(const Homogeneous& curve) : w(weights(curve)) {
     for (const Vec4& p : curve) {
       x.push_back(p[0]);
       y.push_back(p[1]);
@@ -73,7 +73,7 @@ void see(const Homogeneous& curve, const Conic& q, int depth, Fit* fit) {
     see(second, q, depth - 1, fit);
     return;
   }
-  const Plane p(curve);
+  const PlaneCurve p(curve);
   const Scalars gx = combine(2 * q[0], p.x, q[1], p.y, q[3], p.w),
                 gy = combine(q[1], p.x, 2 * q[2], p.y, q[4], p.w),
                 rest = combine(q[3], p.x, q[4], p.y, 2 * q[5], p.w);
@@ -127,7 +127,7 @@ double common_conic_gap(const Homogeneous& one, const Homogeneous& other, bool r
     Homogeneous seen = *curve;
     for (Vec4& p : seen) p.head<3>() = axes * (p.head<3>() - p[3] * centre);
     Fit fit;
-    see(seen, q, kHalvings, &fit);
+    see(seen, q, kConicHalvings, &fit);
     apart += distance(fit, q);
   }
   const double ends = std::max((place(one.front()) - place(reversed ? other.back() : other.front())).norm(),

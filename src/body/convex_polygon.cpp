@@ -9,10 +9,10 @@
 namespace nurbs {
 namespace {
 
-constexpr std::size_t kLanes = 8;         // sides looked at together
+constexpr std::size_t kSides = 8;         // sides looked at together
 constexpr double kEqualTriangles = 1e-6;  // relative: triangles that count as equal when thinning
 constexpr double kSameCentre = 1e-26;     // squared shift, relative to the squared size, that is round-off
-constexpr double kSliver = 1e-10;         // squared width to length of a polygon too thin to shift across
+constexpr double kThin = 1e-10;           // squared width to length of a polygon too thin to shift across
 constexpr double kLeastWeight = 0.1;      // of a corner's own share, after moving the centre
 
 // The line through a side: distance(x) > 0 to its left.
@@ -126,21 +126,21 @@ SideLines::SideLines(const ConvexPolygon& polygon) {
     y_.push_back(line.normal[1]);
     offset_.push_back(line.offset);
   }
-  const std::size_t padded = (x_.size() + kLanes - 1) / kLanes * kLanes;
+  const std::size_t padded = (x_.size() + kSides - 1) / kSides * kSides;
   x_.resize(padded, 0);
   y_.resize(padded, 0);
   offset_.resize(padded, -std::numeric_limits<double>::infinity());
 }
 
 double SideLines::depth_inside(const Vec2& point) const {
-  double least[kLanes];
-  std::fill(least, least + kLanes, std::numeric_limits<double>::infinity());
-  for (std::size_t i = 0; i < x_.size(); i += kLanes)
-    for (std::size_t k = 0; k < kLanes; ++k) {
+  double least[kSides];
+  std::fill(least, least + kSides, std::numeric_limits<double>::infinity());
+  for (std::size_t i = 0; i < x_.size(); i += kSides)
+    for (std::size_t k = 0; k < kSides; ++k) {
       const double d = x_[i + k] * point[0] + y_[i + k] * point[1] - offset_[i + k];
       least[k] = d < least[k] ? d : least[k];
     }
-  return *std::min_element(least, least + kLanes);
+  return *std::min_element(least, least + kSides);
 }
 
 ConvexPolygon intersect(const ConvexPolygon& subject, const ConvexPolygon& window, double slack) {
@@ -217,7 +217,7 @@ void corner_weights(const ConvexPolygon& p, const Vec2& centre, double* weight) 
   Mat2 spread = Mat2::Zero();
   for (int i = 0; i < p.count; ++i) spread += weight[i] * (p.corner[i] - c) * (p.corner[i] - c).transpose();
   const double size = spread.trace();
-  if (!(shift.squaredNorm() > kSameCentre * size && spread.determinant() > kSliver * size * size)) return;
+  if (!(shift.squaredNorm() > kSameCentre * size && spread.determinant() > kThin * size * size)) return;
   Vec2 slope = spread.inverse() * shift;
   double lowest = 0;
   for (int i = 0; i < p.count; ++i) lowest = std::min(lowest, slope.dot(p.corner[i] - c));

@@ -5,7 +5,6 @@
 #include <array>
 #include <cmath>
 #include <functional>
-#include <limits>
 #include <utility>
 
 #include "body/joints.h"
@@ -21,7 +20,6 @@ constexpr size_t kInwardPlaces = 8;       // of cells that bend inward, of eithe
 constexpr double kLeastDepth = 0.25;      // of the excess: a shallow dent's is about that at least
 constexpr int kMostTangents = 40;         // in the search for the hull's plane, per direction ...
 constexpr double kTiltTolerance = 1e-10;  // ... or until its rise is known to this, of that at the ends
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 // Every k-th sample so that at most `most` remain.
 std::vector<int> thin_out(size_t count, int most) {

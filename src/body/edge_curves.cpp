@@ -12,7 +12,7 @@
 namespace nurbs {
 namespace {
 
-constexpr int kHalvings = 7;
+constexpr int kEdgeHalvings = 7;
 constexpr double kTight = 1.2;  // a bound is, over a value that occurs
 
 // Polynomials along a piece of an edge.
@@ -68,7 +68,7 @@ EdgeCurve curve_of(const BezierPatch& patch, int edge) {
   piece.binormal = multiply(piece.hodograph, second, kCross);
   const double noise = 64 * kRoundoff * largest(piece.hodograph) * largest(second);
   double bend = 0, speed = std::numeric_limits<double>::infinity();
-  bound(piece, noise, kHalvings, &bend, &speed);
+  bound(piece, noise, kEdgeHalvings, &bend, &speed);
   constexpr float kUp = 1 + 1e-6F;  // single precision rounds
   EdgeCurve curve;
   if (!(bend < kFarAway && speed > 0)) return curve;

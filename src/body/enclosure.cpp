@@ -40,7 +40,6 @@ std::vector<Vec4> net_of(const BezierPatch& patch, const Cell& cell) {
 
 namespace {
 
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr double kTiny = std::numeric_limits<double>::min();
 
 // What cells must have in common to be enclosed side by side.

@@ -139,9 +139,9 @@ std::vector<Vec2> convex_hull(std::vector<Vec2> points, double tolerance) {
   return hull;
 }
 
-class Finder {
+class FaceFinder {
  public:
-  explicit Finder(const Shape& shape) : shape_(shape), tolerance_(kFlatness * shape.bounding_radius) {}
+  explicit FaceFinder(const Shape& shape) : shape_(shape), tolerance_(kFlatness * shape.bounding_radius) {}
 
   FlatFeatures run() {
     find_faces();
@@ -389,7 +389,7 @@ class Finder {
 }  // namespace
 
 FlatFeatures find_flat_features(const Shape& shape) {
-  return Finder(shape).run();
+  return FaceFinder(shape).run();
 }
 
 int nearest_face(const FlatFeatures& features, const Vec3& d, double cosine) {

@@ -95,8 +95,9 @@ bool ruled_line(const Shape& shape, const SurfacePoint& at, const Vec3& d, doubl
 double turn_to_ruled_line(const Shape& shape, const SurfacePoint& where, const Vec3& d);
 
 // The support set of a body in unit direction d (shape frame, scale 1) widened by `tolerance` (length): the
-// face, else the crease, else the ruled line all of whose points have d . x >= h(d) - tolerance; else the
-// support point. A feature is taken whole or not at all: its points then belong to the body and not to d.
+// face, else the crease, else the ruled line all of whose points have d . x >= h(d) - tolerance, and one of
+// them nearly h(d); else the support point. A feature is taken whole or not at all: its points then belong to
+// the body and not to d.
 // One support search (0.3 to 2 us) and a loop over faces and creases.
 struct SupportSet {
   int count = 0;  // 1: a point, 2: a segment, 3 or more: a polygon, counterclockwise from outside

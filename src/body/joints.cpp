@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
 #include "body/common_conic.h"
 #include "body/connectivity.h"
@@ -12,8 +11,6 @@
 
 namespace nurbs {
 namespace {
-
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 constexpr int kDentHalvings = 6;  // of an edge, in search of what bends up
 constexpr double kBendNoise = 64;

@@ -13,15 +13,16 @@
 namespace nurbs {
 namespace {
 
-constexpr int kHalvings = 6;
+constexpr int kKinkHalvings = 6;
 constexpr double kKinkStray = 4e-3;
 
-struct Stretch {
+struct ChordStretch {
   Chord chord;
   double stray;  // of the joint from it
 };
 
-void add(const Homogeneous& piece, double enough, double gap, int depth, std::vector<Stretch>* stretches) {
+void add(const Homogeneous& piece, double enough, double gap, int depth,
+         std::vector<ChordStretch>* stretches) {
   const double off = stray(piece);
   if (off <= enough || depth == 0) {
     stretches->push_back({Chord(piece), off + gap});
@@ -33,12 +34,12 @@ void add(const Homogeneous& piece, double enough, double gap, int depth, std::ve
 }
 
 // Each joint from the side that comes first, whose gap is counted; poles that are tips are kinked joints too.
-std::vector<Stretch> all_stretches(const Shape& shape) {
-  std::vector<Stretch> stretches;
+std::vector<ChordStretch> all_stretches(const Shape& shape) {
+  std::vector<ChordStretch> stretches;
   visit_joints(shape.links, [&](int patch, int edge) {
     const EdgeLink& link = shape.links[patch][edge];
     if (link.kinked())
-      add(edge_net(shape.patches[patch], edge), kKinkStray * shape.bounding_radius, link.gap, kHalvings,
+      add(edge_net(shape.patches[patch], edge), kKinkStray * shape.bounding_radius, link.gap, kKinkHalvings,
           &stretches);
   });
   return stretches;
@@ -51,7 +52,7 @@ KinkSegments::Pack empty_pack() {
   return pack;
 }
 
-void set(int lane, const Stretch& s, double roundoff, KinkSegments::Pack* pack) {
+void set(int lane, const ChordStretch& s, double roundoff, KinkSegments::Pack* pack) {
   const Vec3 along = s.chord.to - s.chord.from;
   for (int i = 0; i < 3; ++i) {
     pack->from[i][lane] = s.chord.from[i];
@@ -85,7 +86,7 @@ double KinkSegments::distance(int patch, const Vec3& x) const {
 
 KinkSegments find_kink_segments(const Shape& shape) {
   KinkSegments segments;
-  const std::vector<Stretch> stretches = all_stretches(shape);
+  const std::vector<ChordStretch> stretches = all_stretches(shape);
   if (stretches.empty()) return segments;
   segments.first.push_back(0);
   std::vector<double> far(stretches.size());

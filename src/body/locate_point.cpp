@@ -12,7 +12,7 @@ namespace {
 
 constexpr double kLocated = 1e-7;
 constexpr double kNearEdge = 1e-4;  // of a patch's parameters
-constexpr int kIterations = 8, kMostPatches = 12;
+constexpr int kIterations = 8, kPatchesTried = 12;
 
 double miss(const Shape& shape, const SurfacePoint& at, const Vec3& x) {
   return (evaluate0(shape.patches[at.patch], at.u, at.v) - x).norm();
@@ -60,7 +60,7 @@ SurfacePoint locate_point(const Shape& shape, const SurfacePoint& start, const V
   if (on_sharp_edge(shape, start, kOnEdge, x, allowed, &found) || go_to(shape, start, x, allowed, &found))
     return found;
   int tried = 0;
-  for (int p = 0; p < static_cast<int>(shape.patches.size()) && tried < kMostPatches; ++p) {
+  for (int p = 0; p < static_cast<int>(shape.patches.size()) && tried < kPatchesTried; ++p) {
     if (!((x - shape.balls[p].center).norm() <= shape.balls[p].radius + allowed)) continue;
     ++tried;
     if (go_to(shape, {p, 0.5, 0.5}, x, allowed, &found)) return found;

@@ -47,11 +47,11 @@ GaussRule gauss_rule(int n) {
   return rule;
 }
 
-struct Cell {
+struct Square {
   double u0, v0, size;  // a square of the patch's parameters
 };
 
-Moments integrate_cell(const BezierPatch& patch, const Cell& cell, const GaussRule& rule,
+Moments integrate_cell(const BezierPatch& patch, const Square& cell, const GaussRule& rule,
                        const Vec3& reference) {
   Moments sum = Moments::Zero();
   for (size_t i = 0; i < rule.nodes.size(); ++i) {
@@ -69,14 +69,14 @@ Moments integrate_cell(const BezierPatch& patch, const Cell& cell, const GaussRu
   return sum;
 }
 
-Moments integrate_adaptively(const BezierPatch& patch, const Cell& cell, const GaussRule& rule,
+Moments integrate_adaptively(const BezierPatch& patch, const Square& cell, const GaussRule& rule,
                              const Vec3& reference, const Moments& whole, const Moments& allowed,
                              int halvings, int* left) {
   const double h = 0.5 * cell.size;
-  const Cell quarters[4] = {{cell.u0, cell.v0, h},
-                            {cell.u0, cell.v0 + h, h},
-                            {cell.u0 + h, cell.v0, h},
-                            {cell.u0 + h, cell.v0 + h, h}};
+  const Square quarters[4] = {{cell.u0, cell.v0, h},
+                              {cell.u0, cell.v0 + h, h},
+                              {cell.u0 + h, cell.v0, h},
+                              {cell.u0 + h, cell.v0 + h, h}};
   Moments parts[4], sum = Moments::Zero();
   for (int q = 0; q < 4; ++q) {
     parts[q] = integrate_cell(patch, quarters[q], rule, reference);
@@ -156,7 +156,7 @@ MassProperties integrate_mass(const std::vector<BezierPatch>& given) {
     GaussRule& rule = rules[rule_size(patch)];
     if (rule.nodes.empty()) rule = gauss_rule(rule_size(patch));
   }
-  const Cell all{0, 0, 1};
+  const Square all{0, 0, 1};
   std::vector<Moments> whole;
   Moments total = Moments::Zero(), largest = Moments::Zero();
   for (const BezierPatch& patch : patches) {

@@ -12,8 +12,6 @@
 namespace nurbs {
 namespace {
 
-using Row = Meridian::Row;
-
 constexpr double kTurn = 6.283185307179586;  // rad
 constexpr double kRippledOver = 1e-4;        // rad: overlap of patches that are rippled, all round
 
@@ -52,7 +50,7 @@ struct Off {
 };
 
 // An arc its unit circle, of its radius: from the coefficients of x^2 + y^2 - w^2.
-Off off_circle(const Meridian::Sector& s, const Row& weight) {
+Off off_circle(const Meridian::Sector& s, const Meridian::Row& weight) {
   Real most = 0, least = 0;
   for (int m = 0; m <= 2 * s.degree; ++m) {
     Real beyond = 0, square = 0;
@@ -80,7 +78,7 @@ Off factorise(const ArcNet& net, bool rippled, Meridian::Piece* piece, Meridian:
     if (off > r) r = off, widest = j;
   }
   if (!(r > 0)) return none;
-  Row weight{};  // of the arc
+  Meridian::Row weight{};  // of the arc
   sector->degree = net.arc;
   for (int i = 0; i <= net.arc; ++i) {
     const ArcNet::Point& p = net.at(i, widest);
@@ -124,7 +122,9 @@ Off factorise(const ArcNet& net, bool rippled, Meridian::Piece* piece, Meridian:
   const Off circle = off_circle(*sector, weight), off{static_cast<double>(error) + furthest * circle.beyond,
                                                       static_cast<double>(error) + furthest * circle.lack};
   if (rippled) {
-    const auto row = [&](const Row& r) { return std::vector<Real>(r.begin(), r.begin() + net.arc + 1); };
+    const auto row = [&](const Meridian::Row& r) {
+      return std::vector<Real>(r.begin(), r.begin() + net.arc + 1);
+    };
     piece->ripple = ripple_of(net, product, {row(sector->x), row(sector->y), row(weight)}, piece->speed);
     if (piece->ripple.empty()) return none;
   }
@@ -133,7 +133,7 @@ Off factorise(const ArcNet& net, bool rippled, Meridian::Piece* piece, Meridian:
 
 // How far apart two pieces are, run through the same or opposite ways, their weights' difference counted with
 // the body's size.
-double difference(const Meridian::Piece& a, const Meridian::Piece& b, bool backwards, double size) {
+double off_by(const Meridian::Piece& a, const Meridian::Piece& b, bool backwards, double size) {
   if (a.degree != b.degree) return kFarAway;
   double most = 0;
   for (int i = 0; i <= a.degree; ++i) {
@@ -195,7 +195,7 @@ double seam_of(const std::vector<Meridian::Sector>& sectors, const std::vector<B
 struct Jet {
   double f, f1, f2;
 };
-Jet evaluate(const Row& b, int n, double t) {
+Jet evaluate(const Meridian::Row& b, int n, double t) {
   const double s = 1 - t;
   const auto quadratic = [&](double b0, double b1, double b2) {
     const double c0 = s * b0 + t * b1, c1 = s * b1 + t * b2;
@@ -204,7 +204,7 @@ Jet evaluate(const Row& b, int n, double t) {
   if (n == 2) return quadratic(b[0], b[1], b[2]);
   if (n == 0) return {b[0], 0, 0};
   if (n == 1) return {s * b[0] + t * b[1], b[1] - b[0], 0};
-  Row c = b;
+  Meridian::Row c = b;
   for (int k = n; k > 2; --k)
     for (int i = 0; i < k; ++i) c[i] = s * c[i] + t * c[i + 1];
   return quadratic(c[0], c[1], c[2]);
@@ -212,11 +212,11 @@ Jet evaluate(const Row& b, int n, double t) {
 
 // --- the support of the profile
 
-// Part of a piece: coefficients of f = dr r + dz z - level w, and of w.
-struct Part {
+// PiecePart of a piece: coefficients of f = dr r + dz z - level w, and of w.
+struct PiecePart {
   int piece, degree;
   double from, to;  // parameters of the piece
-  Row f, w;
+  Meridian::Row f, w;
 
   // No point of it is further above the level than this times its weight.
   bool below(double more) const {
@@ -231,16 +231,16 @@ Jet quotient(const Jet& f, const Jet& w) {
   return {q, q1, (f.f2 - 2 * q1 * w.f1 - q * w.f2) * over};
 }
 // f / w of a part.
-Jet quotient(const Part& part, double t) {
+Jet quotient(const PiecePart& part, double t) {
   return quotient(evaluate(part.f, part.degree, t), evaluate(part.w, part.degree, t));
 }
-Jet quotient(const Meridian::Piece& piece, const Row& row, double t) {
+Jet quotient(const Meridian::Piece& piece, const Meridian::Row& row, double t) {
   return quotient(evaluate(row, piece.degree, t), evaluate(piece.w, piece.degree, t));
 }
 
 // Whether f - above w is concave all over the part, and by its slope where it is `at` rises by less than more
 // times the weight.
-bool concave_below(const Part& part, double above, const Jet& at, double weight_at, double more) {
+bool concave_below(const PiecePart& part, double above, const Jet& at, double weight_at, double more) {
   double bend = kFarAway, least = part.w[0];  // -f'' at least, over n (n - 1)
   const auto g = [&](int i) { return part.f[i] - above * part.w[i]; };
   for (int i = 0; i + 2 <= part.degree; ++i) bend = std::min(bend, 2 * g(i + 1) - g(i) - g(i + 2));
@@ -276,7 +276,7 @@ class ProfileSearch {
   }
   // From the start; whether it is proven that nothing is higher than height() + slack().
   bool run(const Meridian::Place& start) {
-    Part part = whole(start.piece, 0);
+    PiecePart part = whole(start.piece, 0);
     double t = start.t;
     const Top top = climb(part, &t);
     level_ = top.at.f;
@@ -295,9 +295,9 @@ class ProfileSearch {
   double slack() const { return kRoundoff * size_; }
 
  private:
-  Part whole(int piece, double level) const {
+  PiecePart whole(int piece, double level) const {
     const Meridian::Piece& p = m_.pieces[piece];
-    Part part{piece, p.degree, 0, 1, {}, p.w};
+    PiecePart part{piece, p.degree, 0, 1, {}, p.w};
     for (int i = 0; i <= p.degree; ++i) part.f[i] = dr_ * p.r[i] + dz_ * p.z[i] - level * p.w[i];
     return part;
   }
@@ -315,7 +315,7 @@ class ProfileSearch {
     double weight;
   };
   // From *t to a local maximum. Where the slope is round-off *t stays.
-  Top climb(const Part& part, double* t) const {
+  Top climb(const PiecePart& part, double* t) const {
     const double speed = (part.to - part.from) * m_.pieces[part.piece].speed, noise = kRoundoff * size_;
     Jet at = quotient(part, *t);
     double last = *t;
@@ -341,7 +341,7 @@ class ProfileSearch {
     return {at, evaluate(part.w, part.degree, last).f};
   }
 
-  bool examine(const Part& part, int depth) {
+  bool examine(const PiecePart& part, int depth) {
     if (part.below(above_ + slack())) return true;
     if (depth == 0) return false;
     double t = 0.5;
@@ -355,9 +355,9 @@ class ProfileSearch {
   }
 
   // De Casteljau at t, or in the middle where that is too near an end.
-  bool split(const Part& part, double t, int depth) {
+  bool split(const PiecePart& part, double t, int depth) {
     if (!(t > kMeridianEnd && t < 1 - kMeridianEnd)) t = 0.5;
-    Part low = part, high = part;
+    PiecePart low = part, high = part;
     low.to = high.from = part.from + t * (part.to - part.from);
     for (int i = 0; i <= part.degree; ++i) {
       low.f[i] = high.f[0];
@@ -431,7 +431,7 @@ bool parameter_of(const Meridian::Sector& s, double x, double y, double angle, d
   double share = wrap(angle - (s.begin + 0.5 * s.sweep)) / s.sweep + 0.5;
   if (!(std::abs(share - 0.5) <= 0.5 + kMeridianOver)) return false;
   share = std::clamp(share, 0.0, 1.0);
-  Row across{};
+  Meridian::Row across{};
   for (int i = 0; i <= s.degree; ++i) across[i] = s.y[i] * x - s.x[i] * y;
   for (int k = 0; k < kMeridianSteps; ++k) {
     const Jet f = evaluate(across, s.degree, share);
@@ -440,7 +440,7 @@ bool parameter_of(const Meridian::Sector& s, double x, double y, double angle, d
     const bool done = std::abs(to - share) <= kMeridianTurn;
     share = to;
     if (done) {
-      Row along{};
+      Meridian::Row along{};
       for (int i = 0; i <= s.degree; ++i) along[i] = s.x[i] * x + s.y[i] * y;
       *u = share;
       return evaluate(along, s.degree, share).f > 0;
@@ -504,7 +504,7 @@ Meridian make_meridian(const std::vector<BezierPatch>& patches, const Revolution
     Found* mine = nullptr;
     for (Found& f : all)
       for (const bool backwards : {false, true}) {
-        const double apart = mine ? kFarAway : difference(f.piece, piece, backwards, size);
+        const double apart = mine ? kFarAway : off_by(f.piece, piece, backwards, size);
         if (!(apart <= close)) continue;
         mine = &f;
         sector.backwards = backwards;

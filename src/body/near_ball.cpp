@@ -40,21 +40,21 @@ BallNet net_of(const BezierPatch& patch, double radius) {
 }
 
 // A net on part of its patch.
-class Part {
+class NetPart {
  public:
-  Part(const BallNet& whole, const BallPiece& p) : m_(whole.m), n_(whole.n) {
+  NetPart(const BallNet& whole, const BallPiece& p) : m_(whole.m), n_(whole.n) {
     std::copy(whole.net.begin(), whole.net.end(), c_.begin());
     const int row = n_ + 1;
     for (int j = 0; j < row; ++j) restrict_row(c_.data() + j, m_, row, p.u0, p.u0 + p.du);
     for (int i = 0; i <= m_; ++i) restrict_row(c_.data() + i * row, n_, 1, p.v0, p.v0 + p.dv);
   }
   // Keeps the first half, the other goes to `other`.
-  void halve(bool in_u, Part* other) {
+  void halve(bool in_u, NetPart* other) {
     other->m_ = m_;
     other->n_ = n_;
     halve_net(c_.data(), other->c_.data(), m_, n_, in_u);
   }
-  Part() = default;
+  NetPart() = default;
 
   const Coefficient* begin() const { return c_.data(); }
   const Coefficient* end() const { return c_.data() + static_cast<std::ptrdiff_t>(m_ + 1) * (n_ + 1); }
@@ -84,7 +84,7 @@ class Part {
 };
 
 // Fills in the cone and the ball.
-void fit(const Part& part, const NearBall& body, const Vec3& origin, BallPiece* piece) {
+void fit(const NetPart& part, const NearBall& body, const Vec3& origin, BallPiece* piece) {
   Vec3 middle = Vec3::Zero();
   double height = 0;  // of |x|^2 - R^2
   for (const Coefficient& c : part) {
@@ -151,12 +151,12 @@ void fit(const Part& part, const NearBall& body, const Vec3& origin, BallPiece* 
 
 BallPiece NearBall::whole(int patch, const Vec3& origin) const {
   BallPiece piece{patch, 0, 0, 1, 1, Vec3::Zero(), -1, 0, Vec3::Zero(), 0, 0, 0, -1};
-  fit(Part(patches[patch], piece), *this, origin, &piece);
+  fit(NetPart(patches[patch], piece), *this, origin, &piece);
   return piece;
 }
 
 void NearBall::halve(const BallPiece& piece, const Vec3& origin, BallPiece* first, BallPiece* second) const {
-  Part part(patches[piece.patch], piece), other;
+  NetPart part(patches[piece.patch], piece), other;
   const bool in_u = part.is_longer_in_u();
   part.halve(in_u, &other);
   *first = *second = piece;

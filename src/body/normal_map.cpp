@@ -17,8 +17,6 @@
 namespace nurbs {
 namespace {
 
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
-
 constexpr double kFanStep = 0.02;    // rad, between caps painted across a joint
 constexpr double kNoValley = 1e-12;  // rad: normals' round-off
 

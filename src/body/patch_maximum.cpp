@@ -45,12 +45,12 @@ void copy(const Box& from, Box* to) {
 
 // --- the same for bicubic nets, the usual ones: a row of four coefficients in a register
 
-struct Rows {
+struct LaneRows {
   Lane4 r[4];
-  Rows() = default;
-  NURBS_INLINE explicit Rows(const double* c) { std::memcpy(r, c, sizeof r); }
-  NURBS_INLINE Rows turned() const {
-    Rows t = *this;
+  LaneRows() = default;
+  NURBS_INLINE explicit LaneRows(const double* c) { std::memcpy(r, c, sizeof r); }
+  NURBS_INLINE LaneRows turned() const {
+    LaneRows t = *this;
     transpose({r[0], r[1], r[2], r[3]}, t.r);
     return t;
   }
@@ -61,7 +61,7 @@ NURBS_INLINE double highest(const Lane4& a) {
 }
 
 // De Casteljau at t between rows: r[0] to r[3] become those of [0, t], or of [t, 1].
-NURBS_INLINE void cut_rows(double t, bool keep_low, Rows* c) {
+NURBS_INLINE void cut_rows(double t, bool keep_low, LaneRows* c) {
   const double s = 1 - t;
   Lane4(&r)[4] = c->r;
   const Lane4 a = s * r[0] + t * r[1], b = s * r[1] + t * r[2], d = s * r[2] + t * r[3];
@@ -76,7 +76,7 @@ NURBS_INLINE void cut_rows(double t, bool keep_low, Rows* c) {
     r[2] = d;
   }
 }
-NURBS_INLINE void cut_rows(double from, double to, Rows* c) {
+NURBS_INLINE void cut_rows(double from, double to, LaneRows* c) {
   if (to < 1) cut_rows(to, true, c);
   if (from > 0) cut_rows(from / to, false, c);
 }
@@ -93,7 +93,7 @@ void cut_line(double* c, int degree, int stride, double from, double to) {
 }
 
 // The net of a piece of the patch from the patch's.
-NURBS_INLINE void cut(const PatchPiece& to, Rows* net) {
+NURBS_INLINE void cut(const PatchPiece& to, LaneRows* net) {
   cut_rows(to.u0, to.u1, net);
   if (to.v0 == 0 && to.v1 == 1) return;
   *net = net->turned();
@@ -108,11 +108,11 @@ void cut(const PatchPiece& to, int nu, int nv, double* c) {
 
 // `low` into both halves.
 NURBS_INLINE void halve_bicubic(double* low, double* high, bool along_u) {
-  Rows c(low);
+  LaneRows c(low);
   if (!along_u) c = c.turned();
   const Lane4 a = 0.5 * (c.r[0] + c.r[1]), b = 0.5 * (c.r[1] + c.r[2]), d = 0.5 * (c.r[2] + c.r[3]);
   const Lane4 ab = 0.5 * (a + b), bd = 0.5 * (b + d), middle = 0.5 * (ab + bd);
-  Rows first = c, second = c;
+  LaneRows first = c, second = c;
   first.r[1] = a;
   first.r[2] = ab;
   first.r[3] = second.r[0] = middle;
@@ -126,7 +126,7 @@ NURBS_INLINE void halve_bicubic(double* low, double* high, bool along_u) {
   second.store(high);
 }
 
-void halve(const Box& box, bool along_u, Box* low, Box* high) {
+void halve_box(const Box& box, bool along_u, Box* low, Box* high) {
   copy(box, low);
   high->set_header(box);
   if (along_u)
@@ -197,7 +197,7 @@ Taylor evaluate_net(const double* c, int nu, int nv, double s, double t) {
 }
 
 Taylor evaluate_bicubic(const double* c, double s, double t) {
-  const Rows x(c);
+  const LaneRows x(c);
   const double r = 1 - s, q = 1 - t;
   const Lane4 a = r * x.r[0] + s * x.r[1], b = r * x.r[1] + s * x.r[2], d = r * x.r[2] + s * x.r[3];
   const Lane4 ab = r * a + s * b, bd = r * b + s * d;
@@ -227,7 +227,7 @@ struct Range {
 struct Bounds {
   Range g, gu, gv, guu, guv, gvv;  // first and second differences, not times the degrees
 };
-void difference(const double* g, int nu, int nv, Bounds* b) {
+void net_differences(const double* g, int nu, int nv, Bounds* b) {
   const int row = nv + 1;
   for (int i = 0; i <= nu; ++i)
     for (int j = 0; j <= nv; ++j) {
@@ -244,7 +244,7 @@ void difference(const double* g, int nu, int nv, Bounds* b) {
 }
 
 void difference_bicubic(const double* g, Bounds* b) {
-  const Rows c(g);
+  const LaneRows c(g);
   // Neighbours in a row; the last counts twice.
   const auto step = [](const Lane4& r) {
     const Lane4 d = __builtin_shufflevector(r, r, 1, 2, 3, 3) - __builtin_shufflevector(r, r, 0, 1, 2, 2);
@@ -288,7 +288,7 @@ Bounds bounds_of(const Box& box, bool bicubic, const double* g) {
   if (bicubic)
     difference_bicubic(g, &b);
   else
-    difference(g, box.nu, box.nv, &b);
+    net_differences(g, box.nu, box.nv, &b);
   return b;
 }
 
@@ -367,7 +367,7 @@ class Search {
         keep_edge(edges_along_u_, true, &box);
       } else {
         Box& high = stack_[top + 1];
-        halve(box, next == Next::halve_u, &low, &high);
+        halve_box(box, next == Next::halve_u, &low, &high);
         if (highest_coefficient(low) >= highest_coefficient(high)) {
           copy(high, &box);
         } else {
@@ -385,7 +385,7 @@ class Search {
 
   void set_root(Box* root) const {
     if (root->bicubic()) {  // four points at a time, and all in registers until the rows are stored
-      Rows f, w;
+      LaneRows f, w;
       for (int i = 0; i < 4; ++i) {
         Lane4 p[4], q[4];
         for (int k = 0; k < 4; ++k) std::memcpy(&p[k], patch_.points[4 * i + k].data(), sizeof p[k]);
@@ -430,8 +430,8 @@ class Search {
   bool lower(const Box& box, bool bicubic, double* g) {
     const double level = level_ = best_->h - h0_ + slack_;
     if (bicubic) {
-      Rows c(box.f);
-      const Rows w(box.rational ? box.w : box.f);
+      LaneRows c(box.f);
+      const LaneRows w(box.rational ? box.w : box.f);
       for (int i = 0; i < 4; ++i) c.r[i] -= box.rational ? Lane4(level * w.r[i]) : Lane4{} + level;
       c.store(g);
       return highest(larger(larger(c.r[0], c.r[1]), larger(c.r[2], c.r[3]))) > 0;

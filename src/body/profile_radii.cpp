@@ -16,12 +16,9 @@ constexpr int kMostDepth = 18;           // halvings of a piece
 constexpr double kLeafCells = 0.5;       // that a leaf's normals may cover
 constexpr double kLeafSpread = 0.98;     // least over largest radius of a leaf ...
 constexpr double kNearlyStraight = 1e3;  // ... unless it bends by less than this over the body's size
-constexpr double kSameEnd = 1e-12;       // of the body's size
+constexpr double kSamePlace = 1e-12;     // of the body's size
 constexpr double kBesideCell = 1e-9;     // cells: round-off of a normal's place
 constexpr double kWidestReach = 0.5;     // rad
-
-using Row = Bernstein<double>;
-using Rows = Bernstein<Vec2>;
 
 // From 0, against the axis, to 1, along it: monotone in the angle. Normals that round-off turns beyond the
 // axis belong to its end.
@@ -51,12 +48,12 @@ std::vector<float> tree_of(const std::vector<float>& cells) {
   return tree;
 }
 
-double largest(const Row& row) {
+double largest(const Bernstein<double>& row) {
   double most = 0;
   for (const double x : row) most = std::max(most, std::abs(x));
   return most;
 }
-double longest(const Rows& rows) {
+double longest(const Bernstein<Vec2>& rows) {
   double most = 0;
   for (const Vec2& x : rows) most = std::max(most, x.norm());
   return most;
@@ -67,14 +64,14 @@ Vec2 square_to(const Vec2& tangent, double side) {
 }
 
 // A stretch of a piece, lengths over the body's size.
-struct Leaf {
-  Rows n;  // velocity times w^2
-  Row det, w;
+struct ProfileLeaf {
+  Bernstein<Vec2> n;  // velocity times w^2
+  Bernstein<double> det, w;
 };
 
-class Painter {
+class RadiiPainter {
  public:
-  Painter(double size, double kink) : size_(size), kink_(kink), cell_(kProfileCells, kFarAway) {}
+  RadiiPainter(double size, double kink) : size_(size), kink_(kink), cell_(kProfileCells, kFarAway) {}
 
   // Paints a piece; false where its normals cannot be told.
   bool paint(const Meridian::Piece& piece, ProfileTurn turn) {
@@ -82,7 +79,7 @@ class Painter {
     noise_det_ = turn.det_noise;
     side_ = turn.side;
     const auto at = [&](int i) { return Vec2(Vec2(piece.r[i], piece.z[i]) / (size_ * piece.w[i])); };
-    const Rows& n = turn.velocity;
+    const Bernstein<Vec2>& n = turn.velocity;
     add_end(at(0), end_of(n.begin(), n.end()));
     add_end(at(piece.degree), end_of(n.rbegin(), n.rend()));
     return examine({std::move(turn.velocity), std::move(turn.det), std::move(turn.weight)}, kMostDepth);
@@ -99,12 +96,12 @@ class Painter {
     for (const End& e : ends_) {
       bool met = false;
       for (const End& f : ends_)
-        if (&e != &f && (e.at - f.at).norm() <= kSameEnd) {
+        if (&e != &f && (e.at - f.at).norm() <= kSamePlace) {
           met = true;
           fan(e.normal, f.normal);
         }
-      const bool top = e.at[1] >= high - kSameEnd, bottom = e.at[1] <= low + kSameEnd;
-      if (e.at[0] <= kSameEnd)
+      const bool top = e.at[1] >= high - kSamePlace, bottom = e.at[1] <= low + kSamePlace;
+      if (e.at[0] <= kSamePlace)
         fan(e.normal, Vec2(0, e.at[1] > 0.5 * (low + high) ? 1 : -1));
       else if (!met && top != bottom)
         fan(e.normal, Vec2(0, top ? 1 : -1));
@@ -136,7 +133,7 @@ class Painter {
     while (from + 1 != to && !(from->norm() > noise_n_)) ++from;
     return *from;
   }
-  static Vec2 middle_of(const Rows& n) {
+  static Vec2 middle_of(const Bernstein<Vec2>& n) {
     Vec2 sum = Vec2::Zero();
     for (const Vec2& x : n) sum += x;
     return sum;
@@ -154,7 +151,7 @@ class Painter {
     for (int k = cells.first; k <= cells.last; ++k) cell_[k] = std::min(cell_[k], radius);
   }
 
-  bool examine(Leaf leaf, int depth) {
+  bool examine(ProfileLeaf leaf, int depth) {
     const Vec2 sum = middle_of(leaf.n);
     const double length = sum.norm();
     const Vec2 along = sum / length, across(-along[1], along[0]);
@@ -192,7 +189,7 @@ class Painter {
       return true;
     }
     if (depth == 0) return false;
-    Leaf other;
+    ProfileLeaf other;
     std::tie(leaf.n, other.n) = halve(std::move(leaf.n));
     std::tie(leaf.det, other.det) = halve(std::move(leaf.det));
     std::tie(leaf.w, other.w) = halve(std::move(leaf.w));
@@ -226,7 +223,7 @@ double ProfileRadii::within(double cosine, double sine, double reach) const {
 ProfileRadii make_profile_radii(const Meridian& m, const std::vector<BezierPatch>& patches, double size,
                                 double kink) {
   if (m.empty()) return {};
-  Painter painter(size, kink);
+  RadiiPainter painter(size, kink);
   for (const Meridian::Piece& piece : m.pieces)
     if (!painter.paint(piece, profile_turn(m, piece, patches, size))) return {};
   if (!painter.paint_kinks()) return {};

@@ -26,16 +26,6 @@ std::vector<Vec4> line_of(const BezierPatch& patch, bool arcs_in_u, int i) {
   return line;
 }
 
-// Of polynomials in Bernstein form.
-Row times(const Row& a, const Row& b) {
-  const int p = static_cast<int>(a.size()) - 1, q = static_cast<int>(b.size()) - 1;
-  Row product(a.size() + b.size() - 1, 0);
-  for (int i = 0; i <= p; ++i)
-    for (int k = 0; k <= q; ++k)
-      product[i + k] += a[i] * b[k] * binomial(p, i) * binomial(q, k) / binomial(p + q, i + k);
-  return product;
-}
-
 // The axis and two directions that make a frame with it.
 struct Axes {
   Point point, axis, t, s;
@@ -85,23 +75,23 @@ double off_arcs(const BezierPatch& patch, bool arcs_in_u, const Revolution& abou
   const Coordinates& first = lines[0];
   Real height = 0;  // relative to the weights' product, coefficient by coefficient
   for (const Coordinates& line : lines) {
-    const Row a = times(line.z, first.w), b = times(first.z, line.w), w = times(line.w, first.w);
+    const Row a = multiply(line.z, first.w), b = multiply(first.z, line.w), w = multiply(line.w, first.w);
     for (size_t k = 0; k < a.size(); ++k) height = std::max(height, std::abs(a[k] - b[k]) / w[k]);
   }
-  const Row w2 = times(first.w, first.w);
-  Row r2 = times(first.x, first.x);
-  add(1, times(first.y, first.y), &r2);
+  const Row w2 = multiply(first.w, first.w);
+  Row r2 = multiply(first.x, first.x);
+  add(1, multiply(first.y, first.y), &r2);
   Real across = 0;  // relative to the squared radius
   for (int m = 0; m <= 2 * n; ++m) {
     Row squares, weights;
     for (int i = std::max(0, m - n); i <= std::min(n, m); ++i) {
       const Real share = static_cast<Real>(binomial(n, i)) * binomial(n, m - i) / binomial(2 * n, m);
       const Coordinates &a = lines[i], &b = lines[m - i];
-      add(share, times(a.x, b.x), &squares);
-      add(share, times(a.y, b.y), &squares);
-      add(share, times(a.w, b.w), &weights);
+      add(share, multiply(a.x, b.x), &squares);
+      add(share, multiply(a.y, b.y), &squares);
+      add(share, multiply(a.w, b.w), &weights);
     }
-    const Row left = times(squares, w2), right = times(r2, weights);
+    const Row left = multiply(squares, w2), right = multiply(r2, weights);
     for (size_t k = 0; k < left.size(); ++k) {
       const Real off = std::abs(left[k] - right[k]);
       if (!(off > 0)) continue;

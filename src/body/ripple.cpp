@@ -21,12 +21,9 @@ using Number = Eigen::Matrix<Real, 1, 1>;
 constexpr int kArcHalvings = 3;
 constexpr double kSlack = 1.01;  // of the product's circles, which are nearly that
 
-Row times(const Row& a, const Row& b) {
-  return multiply(a, b, [](Real x, Real y) { return x * y; });
-}
 Row square_of(const UnitArc& arc) {  // x^2 + y^2
-  Row sum = times(arc.x, arc.x);
-  const Row y2 = times(arc.y, arc.y);
+  Row sum = multiply(arc.x, arc.x);
+  const Row y2 = multiply(arc.y, arc.y);
   for (size_t k = 0; k < sum.size(); ++k) sum[k] += y2[k];
   return sum;
 }
@@ -78,12 +75,12 @@ struct ByAzimuth {
 
 // phi = atan2(y, x), phi' = (x y' - y x') / (x^2 + y^2).
 bool by_azimuth(const UnitArc& arc, const Row& square, ByAzimuth* by) {
-  Row turn = difference(times(arc.x, derivative(arc.y)), times(arc.y, derivative(arc.x)));
+  Row turn = difference(multiply(arc.x, derivative(arc.y)), multiply(arc.y, derivative(arc.x)));
   if (turn[0] < 0)
     for (Real& t : turn) t = -t;
   if (!(least(turn) > 0 && least(square) > 0)) return false;
   by->first = largest(square) / least(turn);
-  const Row bend = difference(times(derivative(turn), square), times(turn, derivative(square)));
+  const Row bend = difference(multiply(derivative(turn), square), multiply(turn, derivative(square)));
   by->second = largest(bend) / (least(square) * least(square)) * by->first * by->first * by->first;
   return true;
 }
@@ -154,7 +151,7 @@ struct Extent {
 
 // By how much the arc's radius, the root of 1 + g, is off 1; nothing where that is not little.
 std::optional<Most> radius_off(const UnitArc& arc) {
-  const Row square = square_of(arc), w2 = times(arc.w, arc.w);
+  const Row square = square_of(arc), w2 = multiply(arc.w, arc.w);
   if (!(least(w2) > 0)) return {};
   const Most g = most_of(difference(square, w2)) * inverse(most_of(w2), least(w2));
   if (!(g.f < 0.01)) return {};

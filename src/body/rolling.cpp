@@ -3,15 +3,12 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
 #include "body/shape.h"
 #include "nurbs/tolerances.h"
 
 namespace nurbs {
 namespace {
-
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 // Least length of surface crossed per unit of u (and of v), square to the other parameter line.
 std::array<double, 2> least_speed(const PatchRate& patch) {

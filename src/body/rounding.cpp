@@ -12,15 +12,10 @@ namespace {
 
 constexpr double kRounded = 1e-13;     // of a patch's size and of the squared radius: off its quadric
 constexpr double kBentAnyhow = 1e-11;  // relative error of a curvature that is always allowed for
-constexpr double kTwoNormals = 1e-3;   // rad: closer ones give no radius
-
-struct Sample {
-  Vec3 x, n;
-};
 
 // Away from the patch's edges, which may be collapsed.
-std::vector<Sample> samples_of(const BezierPatch& patch) {
-  std::vector<Sample> samples;
+std::vector<PointAndNormal> samples_of(const BezierPatch& patch) {
+  std::vector<PointAndNormal> samples;
   for (const double u : {0.05, 0.5, 0.95})
     for (const double v : {0.05, 0.5, 0.95}) {
       const Jet1 jet = evaluate1(patch, u, v);
@@ -29,7 +24,7 @@ std::vector<Sample> samples_of(const BezierPatch& patch) {
   return samples;
 }
 
-bool is_plane(const BezierPatch& patch, const Sample& s, double size) {
+bool is_plane(const BezierPatch& patch, const PointAndNormal& s, double size) {
   const bool bilinear = patch.degree_u == 1 && patch.degree_v == 1;
   const Vec3 n = bilinear ? bilinear_normal(patch) : s.n;
   return std::all_of(patch.points.begin(), patch.points.end(), [&](const Vec4& p) {
@@ -51,12 +46,12 @@ double bent_by(const BezierPatch& patch) {
 }
 
 double rounding(const BezierPatch& patch) {
-  const std::vector<Sample> samples = samples_of(patch);
-  const Sample* one = &samples[0];
-  const Sample* two = &samples[0];
+  const std::vector<PointAndNormal> samples = samples_of(patch);
+  const PointAndNormal* one = &samples[0];
+  const PointAndNormal* two = &samples[0];
   double size = 0;
-  for (const Sample& s : samples)
-    for (const Sample& t : samples) {
+  for (const PointAndNormal& s : samples)
+    for (const PointAndNormal& t : samples) {
       size = std::max(size, (s.x - t.x).norm());
       if ((s.n - t.n).squaredNorm() > (one->n - two->n).squaredNorm()) one = &s, two = &t;
     }

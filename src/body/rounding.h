@@ -7,6 +7,13 @@
 
 namespace nurbs {
 
+constexpr double kTwoNormals = 1e-3;  // rad: closer ones give no radius
+
+// A surface point and the unit normal there.
+struct PointAndNormal {
+  Vec3 x, n;
+};
+
 // Of one patch: 0 if it is none of these, infinite if it is plane.
 double rounding(const BezierPatch& patch);
 

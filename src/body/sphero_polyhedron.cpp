@@ -13,7 +13,7 @@
 namespace nurbs {
 namespace {
 
-constexpr int kMostPoints = 64;
+constexpr int kMostBalls = 64;
 constexpr double kMostError = 5e-11;  // of the bounding radius
 constexpr double kMostKink = 1e-6;    // rad
 constexpr double kKinksMet = 16;      // one after the other between two points
@@ -22,7 +22,6 @@ constexpr double kExact = 1e-13;      // of the bounding radius: off balls, plan
 constexpr double kNear = 3e-11;       // ... and few digits
 constexpr double kSamePoint = 1e-12;  // of the bounding radius: of corners
 constexpr double kOnePoint = 1e-9;    // ... and of centres: nearer ones are one that is not known well
-constexpr double kTwoNormals = 1e-3;  // rad: closer ones give no radius
 constexpr int kHullSamples = 9;       // per patch and parameter
 constexpr double kInside = 1e-12;     // of a ball's radius, that it may lie outside
 constexpr double kWithin = 2;         // times what its part is off it: so much smaller ones lie inside
@@ -30,11 +29,7 @@ constexpr double kShared = 3;         // planes end in lines, and these in balls
 constexpr int kMoves = 40;            // halvings of how far a ball may be moved
 constexpr double kMostOff = 1e-12;    // of the bounding radius: supports of the balls' hull and the body's
 
-struct Sample {
-  Vec3 x, n;
-};
-
-Sample sample(const BezierPatch& patch, double u, double v) {
+PointAndNormal sample(const BezierPatch& patch, double u, double v) {
   const Jet1 jet = evaluate1(patch, u, v);
   return {jet.s, jet.su.cross(jet.sv).normalized()};
 }
@@ -55,11 +50,11 @@ struct Curved {
   double radius = 0, angle = 0;
 };
 Curved curved(const BezierPatch& patch) {
-  const Sample corner[] = {sample(patch, 0.05, 0.05), sample(patch, 0.95, 0.05), sample(patch, 0.05, 0.95),
-                           sample(patch, 0.95, 0.95)};
+  const PointAndNormal corner[] = {sample(patch, 0.05, 0.05), sample(patch, 0.95, 0.05),
+                                   sample(patch, 0.05, 0.95), sample(patch, 0.95, 0.95)};
   Curved out{0, kTwoNormals};
-  for (const Sample& s : corner)
-    for (const Sample& t : corner)
+  for (const PointAndNormal& s : corner)
+    for (const PointAndNormal& t : corner)
       if (const double apart = (s.n - t.n).norm(); apart > out.angle)
         out = {(s.n - t.n).dot(s.x - t.x) / (apart * apart), apart};
   return out;
@@ -93,10 +88,10 @@ double off_lines(const BezierPatch& patch, bool along_v, double size) {
   return off;
 }
 
-class Finder {
+class SpheroFinder {
  public:
   // `near`: of the bounding radius, what patches may be off balls, planes and straight lines.
-  Finder(const Shape& shape, double near)
+  SpheroFinder(const Shape& shape, double near)
       : shape_(shape), near_(near * shape.bounding_radius), on_ball_(shape.patches.size(), false) {}
 
   SpheroPolyhedron polyhedron() const {
@@ -111,7 +106,7 @@ class Finder {
           out.error = std::max(out.error, (x - *near).norm());
           continue;
         }
-        if (out.points.size() == kMostPoints) return {};
+        if (out.points.size() == kMostBalls) return {};
         out.points.push_back(x);
       }
     return out;
@@ -248,7 +243,7 @@ class Finder {
       for (size_t i = 0; i < out->centres.size() && !on_ball_[k]; ++i)
         on_ball_[k] = holds(out->centres[i], out->radii[i]);
       if (on_ball_[k] || !(seen[k].radius > 0) || !(seen[k].angle > kTwoNormals)) continue;
-      const Sample middle = sample(patch, 0.5, 0.5);
+      const PointAndNormal middle = sample(patch, 0.5, 0.5);
       const Vec3 centre = middle.x - seen[k].radius * middle.n;
       if (!holds(centre, seen[k].radius)) continue;
       if (static_cast<int>(out->centres.size()) == kMostBalls || is_known(out->centres, centre)) return false;
@@ -284,7 +279,7 @@ class Finder {
     for (const BezierPatch& patch : shape_.patches)
       for (int i = 0; i < kHullSamples; ++i)
         for (int j = 0; j < kHullSamples; ++j) {
-          const Sample s = sample(patch, (i + 0.5) / kHullSamples, (j + 0.5) / kHullSamples);
+          const PointAndNormal s = sample(patch, (i + 0.5) / kHullSamples, (j + 0.5) / kHullSamples);
           double h = -kFarAway;
           for (size_t k = 0; k < hull.centres.size(); ++k)
             h = std::max(h, s.n.dot(hull.centres[k]) + hull.radii[k]);
@@ -311,7 +306,7 @@ class Finder {
     for (const BezierPatch& patch : shape_.patches) {
       const Curved c = curved(patch);
       if (!(c.angle > widest && c.radius > 0)) continue;
-      const Sample middle = sample(patch, 0.5, 0.5);
+      const PointAndNormal middle = sample(patch, 0.5, 0.5);
       if (!is_small(off_ball(patch, middle.x - c.radius * middle.n, c.radius) * c.radius)) continue;
       widest = c.angle;
       out_.radius = c.radius;
@@ -322,7 +317,7 @@ class Finder {
   bool balls() {
     for (int k = 0; k < static_cast<int>(shape_.patches.size()); ++k) {
       const BezierPatch& patch = shape_.patches[k];
-      const Sample middle = sample(patch, 0.5, 0.5);
+      const PointAndNormal middle = sample(patch, 0.5, 0.5);
       const Vec3 centre = middle.x - out_.radius * middle.n;
       double off = kFarAway;
       const auto holds = [&](const Vec3& point) {
@@ -331,7 +326,7 @@ class Finder {
       };
       if (std::none_of(out_.points.begin(), out_.points.end(), holds)) {
         if (!holds(centre)) continue;
-        if (out_.points.size() == kMostPoints || is_known(out_.points, centre)) return false;
+        if (out_.points.size() == kMostBalls || is_known(out_.points, centre)) return false;
         out_.points.push_back(centre);
       }
       on_ball_[k] = true;
@@ -363,24 +358,24 @@ class Finder {
 
 // Exactly, or else up to few digits.
 template <class Form>
-Form find(const Shape& shape, Form (Finder::*form)()) {
+Form find(const Shape& shape, Form (SpheroFinder::*form)()) {
   for (const double near : {kExact, kNear})
-    if (Form found = (Finder(shape, near).*form)(); found.found()) return found;
+    if (Form found = (SpheroFinder(shape, near).*form)(); found.found()) return found;
   return {};
 }
 
 }  // namespace
 
 SpheroPolyhedron find_sphero_polyhedron(const Shape& shape) {
-  return shape.bilinear ? Finder(shape, kExact).polyhedron() : find(shape, &Finder::rounded);
+  return shape.bilinear ? SpheroFinder(shape, kExact).polyhedron() : find(shape, &SpheroFinder::rounded);
 }
 
 BallHull find_ball_hull(const Shape& shape) {
-  return shape.bilinear ? BallHull() : find(shape, &Finder::hull);
+  return shape.bilinear ? BallHull() : find(shape, &SpheroFinder::hull);
 }
 
 BallHull find_inner_balls(const Shape& shape) {
-  return shape.bilinear || shape.joint_slack > 0 ? BallHull() : find(shape, &Finder::inner);
+  return shape.bilinear || shape.joint_slack > 0 ? BallHull() : find(shape, &SpheroFinder::inner);
 }
 
 }  // namespace nurbs

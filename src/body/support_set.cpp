@@ -16,6 +16,9 @@ constexpr double kStraightOn = 1e-8;     // rad, between the pieces of a line, a
 constexpr int kMostPieces = 16;          // patches that a line may cross to each side
 constexpr double kLineAngle = M_PI / 4;  // nor is a line whose normal is further away
 constexpr double kFaceCosine = 0.5;      // a face further away than 60 degrees is not asked
+// Of the tolerance, that the nearest point of a feature may lag behind the support: half the overlap where a
+// polygon is remade; where a ruled line has the support, a twentieth.
+constexpr double kLag = 1.0 / 24, kNoLag = 1.0 / 240;
 
 // Edge of a patch that ends its rulings, low or high.
 int end_edge(Ruling ruling, bool high) {
@@ -126,28 +129,31 @@ SupportSet support_set(const Shape& shape, const Vec3& d, double tolerance) {
   set.where = support.where;
   set.h = support.h;
   set.support = support.point;
-  const double least = set.h - tolerance;
-  const auto inside = [&](const Vec3& x) { return d.dot(x) >= least; };
+  const double slack = kFlatness * shape.bounding_radius;
+  const auto inside = [&](const Vec3& x) { return d.dot(x) >= set.h - tolerance; };
+  const auto bears = [&](const Vec3& x) { return d.dot(x) >= set.h - kLag * tolerance - slack; };
+  const auto bears_all = [&](const Vec3& x) { return d.dot(x) >= set.h - kNoLag * tolerance - slack; };
 
   const int f = nearest_face(flats, d, kFaceCosine);
   if (f >= 0) {
-    const std::vector<int>& corners = flats.faces[f].corners;
-    if (std::all_of(corners.begin(), corners.end(), [&](int v) { return inside(flats.vertices[v]); })) {
+    const std::vector<int>&corners = flats.faces[f].corners, &outline = flats.faces[f].outline;
+    if (std::all_of(corners.begin(), corners.end(), [&](int v) { return inside(flats.vertices[v]); }) &&
+        std::any_of(outline.begin(), outline.end(), [&](int v) { return bears(flats.vertices[v]); })) {
       for (const int v : corners) set_point(set, set.count++, flats.vertices[v], v);
       set.face = f;
       return set;
     }
   }
-  double best = -std::numeric_limits<double>::infinity();
+  double best = -kInfinity;
   for (const StraightEdge& edge : flats.edges) {
     const Vec3 &p = flats.vertices[edge.ends[0]], &q = flats.vertices[edge.ends[1]];
-    if (!inside(p) || !inside(q) || d.dot(p + q) <= best) continue;
+    if (!inside(p) || !inside(q) || !(bears(p) || bears(q)) || d.dot(p + q) <= best) continue;
     best = d.dot(p + q);
     set_point(set, 0, p, edge.ends[0]);
     set_point(set, 1, q, edge.ends[1]);
     set.count = 2;
   }
-  if (set.count > 0) return set;
+  if (set.count > 0 && (bears_all(set.point[0]) || bears_all(set.point[1]))) return set;
   RuledLine line;
   if (ruled_line(shape, support.where, d, kLineAngle, &line) && inside(line.ends[0]) &&
       inside(line.ends[1])) {
@@ -157,6 +163,7 @@ SupportSet support_set(const Shape& shape, const Vec3& d, double tolerance) {
     set.ruled = true;
     return set;
   }
+  if (set.count > 0) return set;
   set_point(set, 0, support.point, -1);
   set.count = 1;
   return set;

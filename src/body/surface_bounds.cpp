@@ -18,7 +18,6 @@
 namespace nurbs {
 namespace {
 
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 // Cells spent on the least radius, over kMostCells: loose, it costs every turning contact of the body a cold
 // solve.
 constexpr int kLeastRadiusBudget = 4;
@@ -147,17 +146,17 @@ bool is_bulging_cylinder(const BezierPatch& patch, double size) {
 
 // A Bernstein net of two parameters, and the products of such nets.
 template <class T>
-struct Form {
-  Form(int m, int n, const T& zero) : m(m), n(n), at((m + 1) * (n + 1), zero) {}
+struct NetForm {
+  NetForm(int m, int n, const T& zero) : m(m), n(n), at((m + 1) * (n + 1), zero) {}
   T& operator()(int i, int j) { return at[i * (n + 1) + j]; }
   const T& operator()(int i, int j) const { return at[i * (n + 1) + j]; }
   int m, n;
   std::vector<T> at;
 };
 template <class T, class S, class Product>
-auto multiplied(const Form<T>& f, const Form<S>& g, const Product& product) {
+auto multiplied(const NetForm<T>& f, const NetForm<S>& g, const Product& product) {
   using Value = decltype(product(f(0, 0), g(0, 0)));
-  Form<Value> out(f.m + g.m, f.n + g.n, product(f(0, 0), g(0, 0)) * 0.0);
+  NetForm<Value> out(f.m + g.m, f.n + g.n, product(f(0, 0), g(0, 0)) * 0.0);
   std::vector<double> in_u, in_v;
   for (int i = 0; i <= f.m; ++i)
     for (int k = 0; k <= g.m; ++k)
@@ -190,7 +189,7 @@ bool may_be_round(const BezierPatch& patch) {
 Ball lies_on(Ball ball, const BezierPatch& patch, double size) {
   const int p = patch.degree_u, q = patch.degree_v;
   if (ball.radius == 0 || !may_be_round(patch)) return {};
-  Form<Vec4> net(p, q, Vec4::Zero());  // about the centre
+  NetForm<Vec4> net(p, q, Vec4::Zero());  // about the centre
   double lightest = kInfinity;
   for (int i = 0; i <= p; ++i)
     for (int j = 0; j <= q; ++j) {
@@ -243,7 +242,7 @@ void on_ball(const Ball& ball, const BezierPatch& patch, Leaf* leaf) {
   CellBounds& out = leaf->bounds;
   const int p = patch.degree_u, q = patch.degree_v;
   if (!out.regular) {
-    Form<Vec3> x(p, q, Vec3::Zero()), u(p - 1, q, Vec3::Zero()), v(p, q - 1, Vec3::Zero());
+    NetForm<Vec3> x(p, q, Vec3::Zero()), u(p - 1, q, Vec3::Zero()), v(p, q - 1, Vec3::Zero());
     const std::vector<Vec4> net = net_of(patch, leaf->cell);
     double heaviest = 0, lightest = kInfinity, weight_u = 0, weight_v = 0, speed_u = 0, speed_v = 0;
     Vec3 axis = Vec3::Zero();

@@ -20,8 +20,8 @@ struct Directions {
 // A body's support along directions near one, to second order: h(d + e) = h + e . x + e' W e / 2.
 class Branch {
  public:
-  Branch() = default;
-  Branch(const Shape& shape, double scale, const SurfacePoint& at) : shape_(&shape), scale_(scale), at_(at) {}
+  Branch(const PairFrame& pair, bool of_a, const SurfacePoint& at)
+      : shape_(of_a ? pair.a : pair.b), scale_(of_a ? pair.scale_a : pair.scale_b), at_(at) {}
 
   // From the surface where it was left; where a Newton step from there is none to be trusted, at the support,
   // which is searched from there. False where it has no such series.
@@ -78,8 +78,8 @@ class Branch {
     return true;
   }
 
-  const Shape* shape_ = nullptr;
-  double scale_ = 1;
+  const Shape* shape_;
+  double scale_;
   SurfacePoint at_;
   Vec3 point_, normal_, tangent_u_, tangent_v_;
   double missed2_ = 0;  // squared angle between the normal and d
@@ -94,13 +94,9 @@ struct Branches {
 
   Branches(const PairFrame& pair, bool two_of_a, const SurfacePoint& first, const SurfacePoint& second,
            const SurfacePoint& other)
-      : of_a(two_of_a) {
-    const Shape &shape = of_a ? *pair.a : *pair.b, &single = of_a ? *pair.b : *pair.a;
-    const double scale = of_a ? pair.scale_a : pair.scale_b;
-    two[0] = Branch(shape, scale, first);
-    two[1] = Branch(shape, scale, second);
-    one = Branch(single, of_a ? pair.scale_b : pair.scale_a, other);
-  }
+      : of_a(two_of_a),
+        two{Branch(pair, two_of_a, first), Branch(pair, two_of_a, second)},
+        one(pair, !two_of_a, other) {}
 };
 
 // The supports near those of the step before; none if the body has no such points.

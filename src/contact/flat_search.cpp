@@ -12,7 +12,7 @@ namespace {
 
 constexpr double kNearFace = 0.995;  // cosine between a face's normal and the direction given: 6 degrees
 constexpr double kCrossing = 1e-3;   // sine of the angle between creases
-constexpr double kAcross = 0.1;      // cosine between a crease and the direction given
+constexpr double kMostAlong = 0.1;   // cosine between a crease and the direction given
 
 // What the proof wants of the disc and the offset.
 bool is_least(const PairFrame& pair, const Vec3& n, double overlap, double m) {
@@ -80,7 +80,7 @@ const StraightEdge* furthest_crease(const FlatFeatures& flats, const Vec3& d) {
   const StraightEdge* best = nullptr;
   double most = -std::numeric_limits<double>::infinity();
   for (const StraightEdge& edge : flats.edges) {
-    if (std::abs(edge.direction.dot(d)) > kAcross) continue;
+    if (std::abs(edge.direction.dot(d)) > kMostAlong) continue;
     const double height = d.dot(flats.vertices[edge.ends[0]] + flats.vertices[edge.ends[1]]);
     if (height > most) most = height, best = &edge;
   }

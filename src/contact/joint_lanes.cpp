@@ -10,21 +10,21 @@
 namespace nurbs {
 namespace {
 
-using V = Triple<Wide>;
+using Vec = Triple<Wide>;
 
-NURBS_INLINE Wide norm2(const V& v) {
+NURBS_INLINE Wide norm2(const Vec& v) {
   return dot(v, v);
 }
-NURBS_INLINE V normalized(const V& v) {
+NURBS_INLINE Vec normalized(const Vec& v) {
   return (1.0 / root(norm2(v))) * v;
 }
 
 struct Surfaces {
-  V s, su, sv, suu, suv, svv;
+  Vec s, su, sv, suu, suv, svv;
 };
 struct Sides {
   Surfaces at;                     // lab axes, from A's centre
-  V normal;                        // outward, unit
+  Vec normal;                      // outward, unit
   WideMask plain;                  // not next to a pole
   Wide inner, outer, slack, near;  // RollingRadii, lengths of the lab
   Wide met;                        // small kinks, rad
@@ -44,7 +44,7 @@ struct SymmetricLanes {
 NURBS_INLINE SymmetricLanes first_form(const Surfaces& f) {
   return {norm2(f.su), dot(f.su, f.sv), norm2(f.sv)};
 }
-NURBS_INLINE SymmetricLanes second_form(const Surfaces& f, const V& along) {
+NURBS_INLINE SymmetricLanes second_form(const Surfaces& f, const Vec& along) {
   return {dot(f.suu, along), dot(f.suv, along), dot(f.svv, along)};
 }
 
@@ -58,13 +58,13 @@ NURBS_INLINE Sides look(unsigned open, const Shape* const (&shape)[kWidth], cons
     for (int l = 0; l < kWidth; ++l) from[l] = reinterpret_cast<const double*>(&jet[l].x + k);
     gather(from, row[k]);
   }
-  const auto own = [&](JetLanes::Slot k) { return V{row[0][k], row[1][k], row[2][k]}; };
+  const auto own = [&](JetLanes::Slot k) { return Vec{row[0][k], row[1][k], row[2][k]}; };
   Sides out;
-  const V su = own(JetLanes::kSu), sv = own(JetLanes::kSv);
+  const Vec su = own(JetLanes::kSu), sv = own(JetLanes::kSv);
   const Wide lu = norm2(su), lv = norm2(sv);
   constexpr double kLost = kNearPole * kNearPole;  // nearer, round-off counts in the certificate
   out.plain = (lu >= kLost * lv) & (lv >= kLost * lu);
-  const V area = cross(su, sv), n = normalized(area);
+  const Vec area = cross(su, sv), n = normalized(area);
   out.inner = out.outer = out.slack = out.near = out.met = out.noise = Wide{};
   Wide size{};
   for (int l = 0; l < kWidth; ++l) {
@@ -84,7 +84,7 @@ NURBS_INLINE Sides look(unsigned open, const Shape* const (&shape)[kWidth], cons
   out.outer *= scale;
   out.slack *= scale;
   out.near *= scale;
-  const auto placed = [&](const V& v) { return scale * (turn * v); };
+  const auto placed = [&](const Vec& v) { return scale * (turn * v); };
   out.normal = turn * n;
   out.at = {placed(own(JetLanes::kS)),
             placed(su),
@@ -107,7 +107,7 @@ NURBS_INLINE Wide excess(const Sides& side, const Wide& radius, const Wide& leas
 
 struct BracketLanes {
   Wide lower, upper, angle2, unique;
-  V direction;
+  Vec direction;
   WideMask apart;  // the direction is that of the balls' centres
 };
 
@@ -116,7 +116,7 @@ NURBS_INLINE BracketLanes certify(const JointLanes& pairs, const Sides& a, const
                                   const Wide& noise, bool any_noise) {
   BracketLanes out;
   const Wide rho_a = smaller(a.inner, pairs.reach), rho_b = smaller(b.inner, pairs.reach);
-  const V between = b.at.s - a.at.s, core = between + rho_a * a.normal - rho_b * b.normal;
+  const Vec between = b.at.s - a.at.s, core = between + rho_a * a.normal - rho_b * b.normal;
   const Wide distance = root(norm2(core));
   out.apart = (dot(core, a.normal - b.normal) > 0.0) & (distance > kNoDirection * pairs.reach);
   out.direction = (1.0 / distance) * core;
@@ -141,7 +141,7 @@ struct StepLanes {
 NURBS_INLINE StepLanes newton_step(const Sides& a, const Sides& b, const SymmetricLanes& first,
                                    const SymmetricLanes& bend_a, const SymmetricLanes& bend_b) {
   const Surfaces &fa = a.at, &fb = b.at;
-  const V g = fa.s - fb.s;
+  const Vec g = fa.s - fb.s;
   const Wide f1u = dot(fa.su, g), f1v = dot(fa.sv, g), f2u = dot(fb.su, a.normal), f2v = dot(fb.sv, a.normal);
   // T' = B's tangents on A's.
   const Wide uu = dot(fb.su, fa.su), uv = dot(fb.su, fa.sv), vu = dot(fb.sv, fa.su), vv = dot(fb.sv, fa.sv);
@@ -181,17 +181,17 @@ NURBS_INLINE WideMask turns_linearly(const Surfaces& f, const SymmetricLanes& fi
          (uu * mixed + vv * norm2(f.svv) <= kTrust * first.c);
 }
 
-NURBS_INLINE V turned_normal(const V& n, const Surfaces& f, const SymmetricLanes& bend,
-                             const SymmetricLanes& inverse, const Wide& du, const Wide& dv) {
+NURBS_INLINE Vec turned_normal(const Vec& n, const Surfaces& f, const SymmetricLanes& bend,
+                               const SymmetricLanes& inverse, const Wide& du, const Wide& dv) {
   const Wide hu = bend.a * du + bend.b * dv, hv = bend.b * du + bend.c * dv;
   return n - (inverse.a * hu + inverse.b * hv) * f.su - (inverse.b * hu + inverse.c * hv) * f.sv;
 }
 
-NURBS_INLINE V taylor(const Surfaces& f, const Wide& du, const Wide& dv) {
+NURBS_INLINE Vec taylor(const Surfaces& f, const Wide& du, const Wide& dv) {
   return f.s + du * f.su + dv * f.sv + (0.5 * du * du) * f.suu + (du * dv) * f.suv + (0.5 * dv * dv) * f.svv;
 }
 
-NURBS_INLINE Wide misfit2(const V& d, const V& g) {
+NURBS_INLINE Wide misfit2(const Vec& d, const Vec& g) {
   return norm2(g - dot(d, g) * d);
 }
 
@@ -279,11 +279,11 @@ unsigned follow_joints(unsigned asked, double enough, JointLanes* pairs) {
          (turn_error(bracket.angle2, pairs->reach) <= tolerance));
 
     // The step spent on a second-order update of points and normal.
-    const V of_a = turned_normal(a.normal, a.at, bend_a, step.metric_a, step.au, step.av),
-            of_b = turned_normal(V{} - b.normal, b.at, bend_b, first_b.inverse(), step.bu, step.bv);
+    const Vec of_a = turned_normal(a.normal, a.at, bend_a, step.metric_a, step.au, step.av),
+              of_b = turned_normal(Vec{} - b.normal, b.at, bend_b, first_b.inverse(), step.bu, step.bv);
     const Wide turn_a = norm2(of_a - a.normal) + kNoTurn, turn_b = norm2(of_b + b.normal) + kNoTurn;
-    const V normal = normalized(turn_b * of_a + turn_a * of_b);
-    const V at_a = taylor(a.at, step.au, step.av), at_b = taylor(b.at, step.bu, step.bv);
+    const Vec normal = normalized(turn_b * of_a + turn_a * of_b);
+    const Vec at_a = taylor(a.at, step.au, step.av), at_b = taylor(b.at, step.bu, step.bv);
     const Wide roundoff = kRoundoff * pairs->reach;
     const WideMask nearer =
         misfit2(normal, at_b - at_a) <= kNearer2 * misfit2(a.normal, b.at.s - a.at.s) + roundoff * roundoff;

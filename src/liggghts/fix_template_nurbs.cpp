@@ -20,7 +20,7 @@ using Spread = NurbsTemplate::Spread;
 
 namespace {
 
-constexpr const char* kUser = "Fix particletemplate/nurbs";
+constexpr const char* kStyle = "Fix particletemplate/nurbs";
 constexpr double kSigmas = 3;  // where a gaussian ends, as the host's do
 
 // A keyword, the words that may follow it and how many values these take.
@@ -68,12 +68,12 @@ std::string list_of(const std::vector<std::string>& words) {
   const std::string hint =
       std::strcmp(word, "radius") == 0 ? "; a NURBS particle's size is its shape's times scale" : "";
   fail_all(FLERR, lmp,
-           std::string(kUser) + ": unknown keyword " + word + hint + "; allowed are " + list_of(known));
+           std::string(kStyle) + ": unknown keyword " + word + hint + "; allowed are " + list_of(known));
 }
 
 // How many words keyword arg[k] takes with its values.
 int length_of(LAMMPS* lmp, const Keyword& keyword, int k, int narg, char** arg) {
-  const std::string what = std::string(kUser) + ": keyword " + keyword.name;
+  const std::string what = std::string(kStyle) + ": keyword " + keyword.name;
   if (k + 1 == narg) fail_all(FLERR, lmp, what + " needs a value");
   if (keyword.choices.empty()) return 2;
   std::vector<std::string> allowed;
@@ -92,25 +92,25 @@ int length_of(LAMMPS* lmp, const Keyword& keyword, int k, int narg, char** arg) 
 // The host's template takes its own keywords only, and stops reading at any other: what is for it, after all
 // has been checked.
 std::vector<char*> host_arguments(LAMMPS* lmp, int narg, char** arg) {
-  AtomVecNurbs::require(lmp, kUser);
-  if (narg < 4) fail_all(FLERR, lmp, std::string(kUser) + " needs a seed");
+  AtomVecNurbs::require(lmp, kStyle);
+  if (narg < 4) fail_all(FLERR, lmp, std::string(kStyle) + " needs a seed");
   std::vector<char*> host(arg, arg + 4);
   std::vector<const Keyword*> given;
   for (int k = 4; k < narg;) {
     const Keyword* keyword = find_keyword(arg[k]);
     if (keyword == nullptr) unknown_keyword(lmp, arg[k]);
     if (std::find(given.begin(), given.end(), keyword) != given.end())
-      fail_all(FLERR, lmp, std::string(kUser) + ": keyword " + arg[k] + " is there twice");
+      fail_all(FLERR, lmp, std::string(kStyle) + ": keyword " + arg[k] + " is there twice");
     given.push_back(keyword);
     const int length = length_of(lmp, *keyword, k, narg, arg);
     if (std::strcmp(keyword->name, "density") == 0)
-      nurbs_host::parse_positive(lmp, std::string(kUser) + ": density", arg[k + 2]);
+      nurbs_host::parse_positive(lmp, std::string(kStyle) + ": density", arg[k + 2]);
     if (!keyword->ours) host.insert(host.end(), arg + k, arg + k + length);
     k += length;
   }
   for (const Keyword& keyword : keywords())
     if (keyword.required && std::find(given.begin(), given.end(), &keyword) == given.end())
-      fail_all(FLERR, lmp, std::string(kUser) + ": missing keyword " + keyword.name);
+      fail_all(FLERR, lmp, std::string(kStyle) + ": missing keyword " + keyword.name);
   return host;
 }
 
@@ -193,9 +193,9 @@ FixTemplateNurbs::FixTemplateNurbs(LAMMPS* lmp, int narg, char** arg)
 
 FixTemplateNurbs::FixTemplateNurbs(LAMMPS* lmp, int narg, char** arg, std::vector<char*> host)
     : FixTemplateSphere(lmp, static_cast<int>(host.size()), host.data()),
-      bodies_(AtomVecNurbs::require(lmp, kUser)),
+      bodies_(AtomVecNurbs::require(lmp, kStyle)),
       seed_(seed_mc) {
-  if (force->cg_active()) fail_all(FLERR, lmp, std::string(kUser) + " can't be used with coarsegraining");
+  if (force->cg_active()) fail_all(FLERR, lmp, std::string(kStyle) + " can't be used with coarsegraining");
   parse(narg, arg);
   volume_expect = shape().mass.volume * expected_cube();
   mass_expect = LMP_PROBABILITY_NS::expectancy(pdf_density) * volume_expect;
@@ -217,26 +217,26 @@ void FixTemplateNurbs::parse(int narg, char** arg) {
   for (int k = 4; k < narg; k += length_of(lmp, *find_keyword(arg[k]), k, narg, arg)) {
     const std::string keyword = arg[k];
     if (keyword == "shape") {
-      model_.shape = bodies_->shapes().require(kUser, arg[k + 1]);
+      model_.shape = bodies_->shapes().require(kStyle, arg[k + 1]);
     } else if (keyword == "scale") {
       parse_scale(arg[k + 1], arg + k + 2);
     } else if (keyword == "orientation") {
       model_.random = std::strcmp(arg[k + 1], "random") == 0;
       if (!model_.random)
         model_.orientation =
-            nurbs_host::parse_quaternion(lmp, std::string(kUser) + ": orientation", arg + k + 2);
+            nurbs_host::parse_quaternion(lmp, std::string(kStyle) + ": orientation", arg + k + 2);
     } else if (keyword == "overlap") {
       model_.overlap = std::strcmp(arg[k + 1], "exact") == 0 ? nurbs::Overlap::exact : nurbs::Overlap::sphere;
     } else if (keyword == "atom_type" && !(1 <= atom_type && atom_type <= atom->ntypes)) {
-      fail_all(
-          FLERR, lmp,
-          std::string(kUser) + ": atom_type " + arg[k + 1] + " must be 1 to " + std::to_string(atom->ntypes));
+      fail_all(FLERR, lmp,
+               std::string(kStyle) + ": atom_type " + arg[k + 1] + " must be 1 to " +
+                   std::to_string(atom->ntypes));
     }
   }
 }
 
 void FixTemplateNurbs::parse_scale(const char* kind, char** values) {
-  const std::string what = std::string(kUser) + ": scale " + kind;
+  const std::string what = std::string(kStyle) + ": scale " + kind;
   const double first = nurbs_host::parse_positive(lmp, what, values[0]);
   model_.low = model_.high = first;
   if (std::strcmp(kind, "constant") == 0) return;
@@ -311,7 +311,7 @@ void FixTemplateNurbs::randomize_single() {
 // kept.
 void FixTemplateNurbs::init_ptilist(int count, const bool, FixPropertyAtom* const release) {
   if (pti_list != nullptr)
-    fail_all(FLERR, lmp, std::string(kUser) + ": its list of particles exists already");
+    fail_all(FLERR, lmp, std::string(kStyle) + ": its list of particles exists already");
   n_pti_max = count;
   pti_list = static_cast<ParticleToInsert**>(memory->smalloc(count * sizeof(ParticleToInsert*), "pti_list"));
   std::fill(pti_list, pti_list + count, nullptr);
@@ -332,7 +332,7 @@ void FixTemplateNurbs::randomize_ptilist(int count, int distribution_groupbit, i
 
 void FixTemplateNurbs::direct_set_ptlist(const int, const void* const, const int, const int) {
   nurbs_host::fail_one(
-      lmp, std::string(kUser) + " can't be used by insert/stream/predefined: its file is of spheres");
+      lmp, std::string(kStyle) + " can't be used by insert/stream/predefined: its file is of spheres");
 }
 
 unsigned int FixTemplateNurbs::generate_hash() {

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstddef>
+#include <type_traits>
 #include <utility>
 #include <vector>
 
@@ -41,6 +42,7 @@ using Bernstein = std::vector<T>;
 template <class A, class B, class Times>
 auto multiply(const Bernstein<A>& a, const Bernstein<B>& b, const Times& times) {
   using T = decltype(times(a[0], b[0]));
+  using Number = std::conditional_t<std::is_same_v<T, long double>, T, double>;
   const int p = static_cast<int>(a.size()) - 1, q = static_cast<int>(b.size()) - 1;
   // C(p,i) a_i and C(q,k) b_k are the coefficients of powers, but for a factor of both.
   Bernstein<A> x(a);
@@ -53,9 +55,13 @@ auto multiply(const Bernstein<A>& a, const Bernstein<B>& b, const Times& times) 
     int i = m > q ? m - q : 0;
     T sum = times(x[i], y[m - i]);
     for (++i; i <= p && i <= m; ++i) sum += times(x[i], y[m - i]);
-    product.push_back(sum * (1 / binomial(p + q, m)));
+    product.push_back(sum * (Number(1) / binomial(p + q, m)));
   }
   return product;
+}
+template <class T>
+Bernstein<T> multiply(const Bernstein<T>& a, const Bernstein<T>& b) {
+  return multiply(a, b, [](const T& x, const T& y) { return T(x * y); });
 }
 
 template <class T>

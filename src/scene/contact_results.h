@@ -1,6 +1,9 @@
 // What the stages of a step hand on to each other about the eight contacts of a block.
 #pragma once
 
+#include <algorithm>
+#include <cmath>
+
 #include "scene/contact_stages.h"
 
 namespace nurbs {
@@ -37,6 +40,7 @@ struct alignas(64) ContactStages::Results {
   double gap[kBlock], lower[kBlock];
   double normal[3][kBlock], point[3][kBlock], offset[3][kBlock];  // point: midpoint of the two
   double touching[kBlock] = {};                                   // 1 or 0
+  double together[kBlock] = {};  // of a polygon's points: the weights of those that bear, summed
   double served[kBlock] = {};
   int iterations[kBlock] = {};  // of those served by Newton
 
@@ -50,6 +54,12 @@ struct alignas(64) ContactStages::Results {
       point[k][lane] = middle[k];
       offset[k][lane] = separation[k];
     }
+  }
+  // The dampers of a contact of weight w are w times this. Of contacts, or points together, that are stiffer
+  // than the law says, because they took over from others, they grow as the root of the stiffness, so that
+  // the ratio of damping, and with it the restitution, is the law's.
+  double damper_share(int lane, double weight) const {
+    return 1 / std::sqrt(std::max({1.0, weight, together[lane]}));
   }
   Vec3 normal_of(int lane) const { return {normal[0][lane], normal[1][lane], normal[2][lane]}; }
   Vec3 offset_of(int lane) const { return {offset[0][lane], offset[1][lane], offset[2][lane]}; }

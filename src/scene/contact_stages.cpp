@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
 #include "contact/ellipsoid_search.h"
 #include "laws/linear_law.h"
@@ -13,7 +12,6 @@
 namespace nurbs {
 namespace {
 
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr double kSamePose =
     1e-6;  // of the smaller radius: bodies that a new run finds nearer were not moved
 constexpr double kStepsToMeet = 2, kStepsToPart = 4;  // see stays_near
@@ -550,7 +548,10 @@ void ContactStages::start_run(ContactBlock& block, int lane, const Results& resu
   const int a = block.a[lane], b = block.b[lane];
   const ContactGeometry geometry = results.geometry(lane);
   ContactState state{};
-  const ContactCoefficients law = coefficients(block, lane);
+  ContactCoefficients law = coefficients(block, lane);
+  const double dampers = results.damper_share(lane, std::abs(block.field[kWeight][lane]));
+  law.cn *= dampers;
+  law.ct *= dampers;
   if (results.touching[lane] != 0) {
     block.get(lane, kStateField, kContactStateSize, &state);
     const bool same = is_where_left(a, geometry, same_place(a, b, results.offset_of(lane)), &state);
@@ -559,7 +560,7 @@ void ContactStages::start_run(ContactBlock& block, int lane, const Results& resu
       if (stays)
         load_model(block, lane, state);
       else
-        ask_model(block, lane, geometry, false);
+        ask_model(block, lane, geometry, dampers, false);
       return;
     }
     if (!stays && !set_contact(law, geometry, motion_of(record(a)), motion_of(record(b)), state))
@@ -641,8 +642,10 @@ void ContactStages::apply_law(ContactBlock& block, int first, const Results& res
   const Wide index = lanes(block, kWeight, first), weight = magnitude(index);
   law.kn *= weight;
   law.kt *= weight;
-  law.cn *= weight;
-  law.ct *= weight;
+  const Wide one = all<Wide>(1), together = larger(weight, got(results.together)),
+             dampers = weight / root(larger(one, together));  // Results::damper_share
+  law.cn *= dampers;
+  law.ct *= dampers;
   const BodyMotionOf<Wide> a = gather_motion(of_a), b = gather_motion(of_b);
   ContactGeometryOf<Wide> g;
   g.overlap = zero - got(results.gap);

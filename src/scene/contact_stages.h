@@ -251,7 +251,8 @@ class ContactStages {
   SphereCurvatures model_curvatures(const ContactBlock& block, int lane,
                                     const ContactGeometry& geometry) const;
   void apply_model(ContactBlock& block, const Results& results);
-  void ask_model(ContactBlock& block, int lane, const ContactGeometry& geometry, bool moves_on);
+  void ask_model(ContactBlock& block, int lane, const ContactGeometry& geometry, double damper_share,
+                 bool moves_on);
   void book_model(const ContactBlock& block, int lane, const ContactState& before, const ModelMemory& old,
                   const ContactState& now, const ModelMemory& own);
   void finish_model(ContactBlock& block, int lane);

@@ -11,6 +11,7 @@ namespace nurbs {
 namespace {
 
 constexpr double kSameNormal = 0.99;  // cosine between a contact's normals of two steps: 8 degrees
+constexpr double kFewDigits = 1e-8;   // of the bounding radius
 
 BodyFrame frame_of(const BodyRecord& r, double scale, const Shape* shape) {
   BodyFrame f;
@@ -23,6 +24,7 @@ BodyFrame frame_of(const BodyRecord& r, double scale, const Shape* shape) {
 
 void fill(const ContactPolygon& polygon, const PolygonState& state, const Vec3& offset, ContactBlock* points,
           ContactStages::Results* results) {
+  double together = 0;
   for (int k = 0; k < kBlock; ++k) {
     const bool there = k < state.count;
     points->field[kWeight][k] = there ? polygon.factor * polygon.weight[k] : 0;
@@ -33,7 +35,9 @@ void fill(const ContactPolygon& polygon, const PolygonState& state, const Vec3& 
       results->point[i][k] = there ? state.arm_a[k][i] : 0;
       results->offset[i][k] = offset[i];
     }
+    together += results->touching[k] * points->field[kWeight][k];
   }
+  std::fill_n(results->together, kBlock, together);
 }
 
 }  // namespace
@@ -150,6 +154,8 @@ bool ContactStages::make_flat(ContactBlock& block, int lane, const Results& sing
 
   ContactState old;
   block.get(lane, kStateField, kContactStateSize, &old);
+  // A contact that begins with an overlap of a few digits holds nothing, and the ratio is round-off's.
+  if (old.active == 0 && overlap < kFewDigits * record(b).radius) polygon.factor = 1;
   FlatContact& flat = pool_.add_flat(block.proof[lane]->contact);
   flat.polygon = polygon;
   flat.points.used = (1u << polygon.count) - 1;

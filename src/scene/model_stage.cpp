@@ -32,6 +32,19 @@ double volume_curvature(const Particle& p) {
   return std::cbrt(2 * kTurn / (3 * p.shape->mass.volume)) / p.scale;  // (4 pi / 3 V)^(1/3)
 }
 
+// Rolling friction takes the effective radius for its lever, which is right for spheres. Of other bodies the
+// lever is the height of their centres over the axis through the contact about which the torque turns, so
+// that one rolls down slopes steeper than the coefficient. The ratio.
+double rolling_lever(const ModelContact& c, const ContactGeometry& g) {
+  const double torque = c.torque.norm();
+  if (!(torque > 0)) return 1;
+  const auto height = [&](const Vec3& arm) { return arm.cross(c.torque).norm() / torque; };
+  const double of_b = height(g.arm_b - 0.5 * g.overlap * g.normal);
+  if (c.a < 0) return of_b / c.radius_b;
+  const double of_a = height(g.arm_a + 0.5 * g.overlap * g.normal);
+  return of_a * of_b / (of_a + of_b) * (1 / c.radius_a + 1 / c.radius_b);
+}
+
 }  // namespace
 
 SphereCurvatures ContactStages::model_curvatures(const ContactBlock& block, int lane,
@@ -63,7 +76,9 @@ void ContactStages::forget_spheres(ContactBlock& block, int lane) {
 
 void ContactStages::apply_model(ContactBlock& block, const Results& results) {
   for (int lane = 0; lane < kBlock; ++lane)
-    if (results.touching[lane] != 0) ask_model(block, lane, results.geometry(lane), true);
+    if (results.touching[lane] != 0)
+      ask_model(block, lane, results.geometry(lane),
+                results.damper_share(lane, std::abs(block.field[kWeight][lane])), true);
 }
 
 // The question that a contact puts to the model, without its history.
@@ -109,7 +124,10 @@ double ContactStages::model_energy(const ContactBlock& block, int lane, const Co
   return std::isfinite(c.normal_energy) ? c.normal_energy : 0;
 }
 
-void ContactStages::ask_model(ContactBlock& block, int lane, const ContactGeometry& g, bool moves_on) {
+// Dampers are linear in the velocity: it gets their share (Results::damper_share). Across the normal, where
+// the model's springs follow it too, it stays.
+void ContactStages::ask_model(ContactBlock& block, int lane, const ContactGeometry& g, double damper_share,
+                              bool moves_on) {
   const int a = block.a[lane], b = block.b[lane];
   ModelMemory& own = model_memory(block, lane);
   if (own.kind != step_.model->kind()) {  // a new contact, or one of another model, by a restart
@@ -129,10 +147,12 @@ void ContactStages::ask_model(ContactBlock& block, int lane, const ContactGeomet
   ModelContact c = model_contact(block, lane, g, own);
   c.moves_on = moves_on;
   c.history = pool_.memory(block, lane) + kModelMemory;
+  const Vec3 velocity = c.velocity;
+  c.velocity -= (1 - damper_share) * velocity.dot(g.normal) * g.normal;
   step_.model->force(c);
 
   const double weight = block.field[kWeight][lane];
-  const Vec3 force = weight * c.force, torque = weight * c.torque;
+  const Vec3 force = weight * c.force, torque = weight * rolling_lever(c, g) * c.torque;
   if (!std::isfinite(force.sum() + torque.sum())) {
     counts_.value[ContactCounts::unresolved] += share(a, b);
     std::fill_n(pool_.memory(block, lane), pool_.memory_size(), 0.0);
@@ -145,8 +165,8 @@ void ContactStages::ask_model(ContactBlock& block, int lane, const ContactGeomet
   store(g.normal, state.normal);
   store(g.arm_a, state.arm_a);
   store(g.arm_b, state.arm_b);
-  state.rate = -c.velocity.dot(g.normal);
-  store(Vec3(c.velocity + state.rate * g.normal), state.slip);
+  state.rate = -velocity.dot(g.normal);
+  store(Vec3(velocity + state.rate * g.normal), state.slip);
   state.normal_force = force.dot(g.normal);
   store(Vec3(force - state.normal_force * g.normal), state.tangential_force);
   state.sliding = c.slides ? 1 : 0;

@@ -17,21 +17,21 @@ using Vector = Eigen::VectorXd;
 using Sparse = Eigen::SparseMatrix<double>;
 
 constexpr int kSteps = 60;
-constexpr int kCentreSteps = 12;     // at the most ...
-constexpr double kCentred = 0.1;     // ... and until no slack changes by more than this share
-constexpr int kDenser = 3;           // times that places are added where there are dents between others
-constexpr double kFirstRoom = 1.5;   // allowed error over that of the ball the fit starts from
-constexpr double kNearly = 1.03;     // of the distances wanted: from there on the centre is looked for ...
-constexpr double kRoom = 1.005;      // ... of what the distances wanted, or this times those reached, leave
-constexpr double kMostChange = 0.5;  // share of the gauge that a step may change
-constexpr double kGap = 0.01;        // share of the allowed error: so near to the least one it ends
-constexpr double kFarGap = 0.04;     // .. where that one is too far
-constexpr double kForms = 0.5;       // weight of log det of curvature, that of a distance being 1
-constexpr double kInside = 0.97;     // of the way to a bound
-constexpr double kShortest = 1e-4;   // steps: nothing more is to be had
-constexpr double kReserve = 0.25;    // share of the least curvature that is wanted between places
-constexpr double kNewSlack = 0.1;    // of a place added, over its form's trace
-constexpr double kRegular = 1e-9;    // of the conditions' block of the matrix
+constexpr int kCentreSteps = 12;       // at the most ...
+constexpr double kCentred = 0.1;       // ... and until no slack changes by more than this share
+constexpr int kDenser = 3;             // times that places are added where there are dents between others
+constexpr double kFirstRoom = 1.5;     // allowed error over that of the ball the fit starts from
+constexpr double kNearly = 1.03;       // of the distances wanted: from there on the centre is looked for ...
+constexpr double kRoom = 1.005;        // ... of what the distances wanted, or this times those reached, leave
+constexpr double kMostChange = 0.5;    // share of the gauge that a step may change
+constexpr double kGap = 0.01;          // share of the allowed error: so near to the least one it ends
+constexpr double kFarGap = 0.04;       // .. where that one is too far
+constexpr double kForms = 0.5;         // weight of log det of curvature, that of a distance being 1
+constexpr double kInside = 0.97;       // of the way to a bound
+constexpr double kShortest = 1e-4;     // steps: nothing more is to be had
+constexpr double kReserve = 0.25;      // share of the least curvature that is wanted between places
+constexpr double kNewSlack = 0.1;      // of a place added, over its form's trace
+constexpr double kRegularised = 1e-9;  // of the conditions' block of the matrix
 
 // A bound's slack and multiplier, the residual of the slack, changes of both in a step, and the product of
 // those that the first, affine step would make.
@@ -345,7 +345,7 @@ class InteriorPoint {
     for (int column = 0; column < c.outerSize(); ++column)
       for (Sparse::InnerIterator it(c, column); it; ++it)
         entries.emplace_back(count + it.row(), it.col(), it.value());
-    for (int k = count; k < size; ++k) entries.emplace_back(k, k, -kRegular);
+    for (int k = count; k < size; ++k) entries.emplace_back(k, k, -kRegularised);
     matrix_.resize(size, size);
     matrix_.setFromTriplets(entries.begin(), entries.end());
     matrix_.makeCompressed();

@@ -158,11 +158,11 @@ double distance_to_body(const Shape& shape, const Vec3& v, double enough) {
   return std::min(best, distance_by_supports(shape, v, enough));
 }
 
-struct Piece {
+struct HullPiece {
   BezierPatch patch;
   double bound;  // of its distance to the hull
   int vertex;    // of the hull, near it
-  bool operator<(const Piece& other) const { return bound < other.bound; }
+  bool operator<(const HullPiece& other) const { return bound < other.bound; }
 };
 
 // Largest distance of the control points to the hull.
@@ -179,7 +179,7 @@ std::pair<BezierPatch, BezierPatch> halve(const BezierPatch& patch, bool in_u) {
 }
 
 double outward_distance(const Shape& shape, const ConvexHull& hull, double resolution) {
-  std::priority_queue<Piece> pieces;
+  std::priority_queue<HullPiece> pieces;
   double found = 0;
   int vertex = 0;
   const auto add = [&](const BezierPatch& patch) {
@@ -193,7 +193,7 @@ double outward_distance(const Shape& shape, const ConvexHull& hull, double resol
     add(moved);
   }
   for (int k = 0; k < kMostPieces && pieces.top().bound > found + resolution; ++k) {
-    const Piece worst = pieces.top();
+    const HullPiece worst = pieces.top();
     pieces.pop();
     vertex = worst.vertex;
     const auto halves = halve(worst.patch, true);

@@ -13,9 +13,9 @@ namespace nurbs {
 namespace {
 
 constexpr int kCorners = 14;
-constexpr double kPower = 9;              // q: of the rounded polyhedron
-constexpr double kRaise = 0.1;            // of the roundness, until the patches are convex
-constexpr double kLeastCurvature = 0.05;  // wanted, of a body of radius 1
+constexpr double kPower = 9;           // q: of the rounded polyhedron
+constexpr double kRaise = 0.1;         // of the roundness, until the patches are convex
+constexpr double kRoundEnough = 0.05;  // wanted, of a body of radius 1
 constexpr int kCheckGrid = 16;
 
 // SplitMix64 (Steele, Lea & Flood 2014): standard distributions differ between libraries.
@@ -93,7 +93,7 @@ std::vector<NurbsSurface> random_pebble(std::uint64_t seed, const PebbleForm& fo
       return pebble_point(corners, roundness, d.normalized());
     };
     std::vector<NurbsSurface> body = cube.surfaces(fit_points(cube, target));
-    if (roundness < 1 && least_curvature(body) < kLeastCurvature) continue;
+    if (roundness < 1 && least_curvature(body) < kRoundEnough) continue;
     give_form(body, form);
     return body;
   }

@@ -15,11 +15,11 @@ namespace nurbs {
 namespace {
 
 constexpr int kDegree = 4, kMostSpans = 4;
-constexpr double kLeastCurvature = 0.02, kMostCurvature = 1e3;
-constexpr double kSlide = 2;            // edges gather parameter lines
-constexpr double kStart = 0.97;         // of the exact size: from inside
-constexpr int kErrorGrid = 100;         // per patch parameter
-constexpr double kSurelyTooCoarse = 6;  // times the tolerance: the curvature is not raised
+constexpr double kFlattest = 0.02, kSharpest = 1e3;
+constexpr double kSlide = 2;         // edges gather parameter lines
+constexpr double kStart = 0.97;      // of the exact size: from inside
+constexpr int kErrorGrid = 100;      // per patch parameter
+constexpr double kFarTooCoarse = 6;  // times the tolerance: the curvature is not raised
 
 // Signed distance to first order from |x|^e + |y|^e + |z|^e = 1: the gauge function over its slope.
 TargetOffset offset(const Vec3& x, double e) {
@@ -55,7 +55,7 @@ Superellipsoid convex_superellipsoid(const Vec3& semi_axes, double exponent, dou
   const OffsetTarget target = [exponent](const Vec3& x, const Vec3&, int&) { return offset(x, exponent); };
   ConvexFitOptions options;
   options.tolerance = tolerance;
-  options.most_curvature = kMostCurvature;
+  options.most_curvature = kSharpest;
   options.cut_weight = 1;
   options.slide = kSlide;
   double least = 1e300;
@@ -65,7 +65,7 @@ Superellipsoid convex_superellipsoid(const Vec3& semi_axes, double exponent, dou
       const Vec3 d = cube_direction(f, std::tan((2 * u - 1) * M_PI / 4), std::tan((2 * v - 1) * M_PI / 4));
       return Vec3(kStart * d / std::pow(d.array().abs().pow(exponent).sum(), 1 / exponent));
     };
-    options.least_curvature = kLeastCurvature;
+    options.least_curvature = kFlattest;
     std::optional<Superellipsoid> best;
     const auto accept = [&](const ConvexFit& fit) {
       Superellipsoid body{cube.surfaces(fit.points), 0};
@@ -76,7 +76,7 @@ Superellipsoid convex_superellipsoid(const Vec3& semi_axes, double exponent, dou
       return true;
     };
     const ConvexFit fit = fit_convex(cube, fit_points(cube, start), target, options);
-    if (fit.error > kSurelyTooCoarse * tolerance) continue;
+    if (fit.error > kFarTooCoarse * tolerance) continue;
     if (accept(fit)) raise_curvature(cube, fit, target, options, accept);
     if (!best) continue;
     transform(best->surfaces, semi_axes.asDiagonal(), Vec3::Zero());

@@ -16,14 +16,14 @@ namespace {
 using Sparse = Eigen::SparseMatrix<double>;
 using Columns = Eigen::Matrix<double, Eigen::Dynamic, 3, Eigen::RowMajor>;  // x, y, z of each unknown
 using Vector = Eigen::VectorXd;
-constexpr int kDegree = 3, kAlive = 16;  // control points that act on one piece
+constexpr int kCubic = 3, kAlive = 16;  // control points that act on one piece
 // Samples of the fit per span, and at least per patch, in each direction; and of the grid that measures the
 // error.
 constexpr int kFitPoints = 5, kLeastFitPoints = 10, kErrorPoints = 24;
-constexpr int kIterations = 100;
-constexpr double kFirstDamping = 1e-2, kLeastDamping = 1e-4,
-                 kLargestDamping = 1e6;  // relative to the mass matrix
-constexpr double kSmallestGain = 3e-4;   // relative fall of the sum of squares at which the iteration stops
+constexpr int kMostIterations = 100;
+constexpr double kFirstLambda = 1e-2, kLeastLambda = 1e-4,
+                 kLargestLambda = 1e6;  // relative to the mass matrix
+constexpr double kSmallestFall = 3e-4;  // relative fall of the sum of squares at which the iteration stops
 
 // Values and first derivatives at t of the four cubic B-splines alive on the span from knot k.
 struct CubicBasis {
@@ -32,8 +32,8 @@ struct CubicBasis {
 
 CubicBasis cubic_basis(const std::vector<double>& knots, int k, double t) {
   std::array<double, 4> b{1, 0, 0, 0}, quadratic{};
-  for (int p = 1; p <= kDegree; ++p) {  // NURBS Book A2.2
-    if (p == kDegree) quadratic = b;
+  for (int p = 1; p <= kCubic; ++p) {  // NURBS Book A2.2
+    if (p == kCubic) quadratic = b;
     double saved = 0;
     for (int r = 0; r < p; ++r) {
       const double right = knots[k + r + 1], left = knots[k + 1 - p + r];
@@ -44,11 +44,11 @@ CubicBasis cubic_basis(const std::vector<double>& knots, int k, double t) {
     b[p] = saved;
   }
   CubicBasis out{b, {}};
-  for (int r = 0; r <= kDegree; ++r) {  // NURBS Book eq. 2.7
-    const int i = k - kDegree + r;
-    const double before = r > 0 ? quadratic[r - 1] / (knots[i + kDegree] - knots[i]) : 0;
-    const double after = r < kDegree ? quadratic[r] / (knots[i + kDegree + 1] - knots[i + 1]) : 0;
-    out.slope[r] = kDegree * (before - after);
+  for (int r = 0; r <= kCubic; ++r) {  // NURBS Book eq. 2.7
+    const int i = k - kCubic + r;
+    const double before = r > 0 ? quadratic[r - 1] / (knots[i + kCubic] - knots[i]) : 0;
+    const double after = r < kCubic ? quadratic[r] / (knots[i + kCubic + 1] - knots[i + 1]) : 0;
+    out.slope[r] = kCubic * (before - after);
   }
   return out;
 }
@@ -60,7 +60,7 @@ struct Sample {
   Vec3 direction;  // unit; equal steps of u or v are equal angles
 };
 
-struct Piece {
+struct SpanPiece {
   std::array<int, kAlive> columns;  // net indices of its control points
   std::vector<Sample> samples;
 };
@@ -76,19 +76,19 @@ Sample make_sample(const CubicBasis& u, const CubicBasis& v) {
 }
 
 // Samples at the parameters `at` of one span, relative to it, in both directions.
-std::vector<Piece> make_pieces(const CubeNet& net, const std::vector<double>& knots, int spans,
-                               const std::vector<double>& at) {
-  std::vector<Piece> pieces;
+std::vector<SpanPiece> make_pieces(const CubeNet& net, const std::vector<double>& knots, int spans,
+                                   const std::vector<double>& at) {
+  std::vector<SpanPiece> pieces;
   const auto angle = [](double t) { return std::tan((2 * t - 1) * M_PI / 4); };
   for (int k = 0; k < kCubeFaces * spans * spans; ++k) {
     const int f = k / (spans * spans), a = k / spans % spans, b = k % spans;
-    Piece piece;
+    SpanPiece piece;
     for (int c = 0; c < kAlive; ++c) piece.columns[c] = net.index(f, a + c / 4, b + c % 4);
     for (double s : at) {
       for (double t : at) {
         const double u = (a + s) / spans, v = (b + t) / spans;
         piece.samples.push_back(
-            make_sample(cubic_basis(knots, kDegree + a, u), cubic_basis(knots, kDegree + b, v)));
+            make_sample(cubic_basis(knots, kCubic + a, u), cubic_basis(knots, kCubic + b, v)));
         piece.samples.back().direction = cube_direction(f, angle(u), angle(v)).normalized();
       }
     }
@@ -145,7 +145,7 @@ Sparse allowed_nets(const CubeNet& net, Joints joints) {
 }
 
 // Control points of one piece, one per row.
-Eigen::Matrix<double, kAlive, 3> gather(const Piece& piece, const Columns& points) {
+Eigen::Matrix<double, kAlive, 3> gather(const SpanPiece& piece, const Columns& points) {
   Eigen::Matrix<double, kAlive, 3> out;
   for (int c = 0; c < kAlive; ++c) out.row(c) = points.row(piece.columns[c]);
   return out;
@@ -179,13 +179,13 @@ Sparse for_each_coordinate(const Sparse& m) {
 
 // Sum over samples of offset^2 + slope_weight^2 ((gradient . su)^2 + (gradient . sv)^2), linearised about
 // `points` with the gradient held fixed.
-NormalEquations offset_equations(const FitTarget& target, const std::vector<Piece>& pieces,
+NormalEquations offset_equations(const FitTarget& target, const std::vector<SpanPiece>& pieces,
                                  const Columns& points, double slope_weight, const Sparse& fairing,
                                  bool cost_only) {
   NormalEquations out;
   out.load = Vector::Zero(3 * points.rows());
   std::vector<Eigen::Triplet<double>> entries;
-  for (const Piece& piece : pieces) {
+  for (const SpanPiece& piece : pieces) {
     const auto local = gather(piece, points);
     Eigen::Matrix<double, 3 * kAlive, 3 * kAlive> matrix = decltype(matrix)::Zero();
     Eigen::Matrix<double, 3 * kAlive, 1> load = decltype(load)::Zero(), row;
@@ -223,11 +223,11 @@ NormalEquations offset_equations(const FitTarget& target, const std::vector<Piec
 
 // Mass matrix of the samples, per coordinate, and the load of the fit to the target's starting
 // parametrisation.
-std::pair<Sparse, Columns> mass_equations(const FitTarget& target, const std::vector<Piece>& pieces,
+std::pair<Sparse, Columns> mass_equations(const FitTarget& target, const std::vector<SpanPiece>& pieces,
                                           int count) {
   Columns load = Columns::Zero(count, 3);
   std::vector<Eigen::Triplet<double>> entries;
-  for (const Piece& piece : pieces) {
+  for (const SpanPiece& piece : pieces) {
     Eigen::Matrix<double, kAlive, kAlive> local = decltype(local)::Zero();
     for (const Sample& sample : piece.samples) {
       local.noalias() += sample.s * sample.s.transpose();
@@ -270,7 +270,7 @@ Vector solve(const Sparse& matrix, const Vector& load) {
 
 // Levenberg-Marquardt over the nets spanned by `basis`, damped by the mass matrix (so by how far the surface
 // moves).
-Columns fit_points(const FitTarget& target, const std::vector<Piece>& pieces, const Sparse& basis,
+Columns fit_points(const FitTarget& target, const std::vector<SpanPiece>& pieces, const Sparse& basis,
                    double slope_weight, const Sparse& fairing) {
   const int count = static_cast<int>(basis.rows());
   const auto [mass, load] = mass_equations(target, pieces, count);
@@ -280,8 +280,8 @@ Columns fit_points(const FitTarget& target, const std::vector<Piece>& pieces, co
   for (int c = 0; c < 3; ++c) points.col(c) = basis * solve(reduced_mass, basis.transpose() * load.col(c));
 
   NormalEquations now = offset_equations(target, pieces, points, slope_weight, fairing, false);
-  double damping = kFirstDamping;
-  for (int k = 0; k < kIterations && damping < kLargestDamping; ++k) {
+  double damping = kFirstLambda;
+  for (int k = 0; k < kMostIterations && damping < kLargestLambda; ++k) {
     const Sparse matrix = Sparse(basis3.transpose() * now.matrix * basis3) + damping * inertia;
     const Vector step = basis3 * solve(matrix, basis3.transpose() * now.load);
     const Columns trial = points - Eigen::Map<const Columns>(step.data(), count, 3);
@@ -290,18 +290,18 @@ Columns fit_points(const FitTarget& target, const std::vector<Piece>& pieces, co
       damping *= 4;
       continue;
     }
-    const bool done = now.cost - cost < kSmallestGain * now.cost;
+    const bool done = now.cost - cost < kSmallestFall * now.cost;
     points = trial;
     if (done) break;
     now = offset_equations(target, pieces, points, slope_weight, fairing, false);
-    damping = std::max(damping / 3, kLeastDamping);
+    damping = std::max(damping / 3, kLeastLambda);
   }
   return points;
 }
 
-double largest_offset(const FitTarget& target, const std::vector<Piece>& pieces, const Columns& points) {
+double largest_offset(const FitTarget& target, const std::vector<SpanPiece>& pieces, const Columns& points) {
   double largest = 0;
-  for (const Piece& piece : pieces) {
+  for (const SpanPiece& piece : pieces) {
     const auto local = gather(piece, points);
     for (const Sample& sample : piece.samples) {
       largest = std::max(largest, std::abs(offset_at(target, local, sample).distance));
@@ -314,8 +314,8 @@ double largest_offset(const FitTarget& target, const std::vector<Piece>& pieces,
 
 SurfaceFit fit_cube_body(const FitTarget& target, const FitOptions& options) {
   const int spans = options.spans;
-  const CubeNet net(spans + kDegree);
-  const std::vector<double> knots = uniform_knots(kDegree, spans);
+  const CubeNet net(spans + kCubic);
+  const std::vector<double> knots = uniform_knots(kCubic, spans);
   const Sparse basis = allowed_nets(net, spans == 1 ? options.joints : Joints::kKinked);
   const int samples = std::max(kFitPoints, kLeastFitPoints / spans);
   const double slope_weight = options.slope_weight / spans;
@@ -327,7 +327,7 @@ SurfaceFit fit_cube_body(const FitTarget& target, const FitOptions& options) {
   std::vector<Vec4> homogeneous;
   for (int k = 0; k < points.rows(); ++k)
     homogeneous.emplace_back(points(k, 0), points(k, 1), points(k, 2), 1);
-  fit.surfaces = cube_surfaces(net, kDegree, knots, homogeneous);
+  fit.surfaces = cube_surfaces(net, kCubic, knots, homogeneous);
   return fit;
 }
 

@@ -227,5 +227,45 @@ TEST(OuterFeatures, corners_and_edges_on_corners_and_edges) {
   EXPECT_LE(deeper, 16);  // 356
 }
 
+// Sharp bodies near the bottom of valleys that poke through one of the walls: the line from the centre to the
+// deepest point crosses it. 1 in 2,000 had no contact, where the foot of that point is beyond the bottom.
+TEST(OuterFeatures, valleys_that_a_corner_pokes_through) {
+  Random random(11);
+  const auto list = bodies(random);
+  int judged = 0, missed = 0;
+  for (int k = 0; k < 60000; ++k) {
+    const auto& [name, shape] = list[k % list.size()];
+    const double angle = random.uniform(0.4, 2.6);
+    const Vec3 up[2] = {{1, 0, 0},
+                        {std::cos(angle), std::sin(angle), 0}};  // along the walls, from the bottom
+    const Vec3 normal[2] = {{0, 1, 0}, {std::sin(angle), -std::cos(angle), 0}};
+    std::vector<Triangle> walls;
+    for (const Vec3& u : up) {
+      const Vec3 a(0, 0, -9), b(0, 0, 9), c = b + 18 * u, e = a + 18 * u;
+      walls.push_back({a, b, c});
+      walls.push_back({a, c, e});
+    }
+    Particle body{shape.get(), 1 / shape->bounding_radius, Vec3::Zero(), random.turn()};
+    const auto deepest = [&](int wall) -> Vec3 {
+      const Vec3 down = body.q.conjugate() * -normal[wall];
+      return body.x + body.scale * (body.q * find_feature_support(*shape, down).point);
+    };
+    body.x = -deepest(1) + random.uniform(-0.1, 0.1) * up[1] - random.log_uniform(1e-4, 0.05) * normal[1];
+    bool crosses = false, above = true;
+    for (int wall = 0; wall < 2; ++wall) {
+      const Vec3 tip = deepest(wall);
+      const double height = normal[wall].dot(body.x), depth = -normal[wall].dot(tip);
+      above = above && height > 0 && depth < 0.08;
+      const Vec3 through = (depth * body.x + height * tip) / (height + depth);
+      crosses = crosses || (depth > 1e-6 && up[wall].dot(through) > 1e-6);
+    }
+    if (!above || !crosses) continue;
+    ++judged;
+    missed += contacts(body, walls).count == 0;
+  }
+  EXPECT_GT(judged, 5000);
+  EXPECT_EQ(missed, 0);
+}
+
 }  // namespace
 }  // namespace nurbs

@@ -7,21 +7,19 @@
 #include "body/cube_map.h"
 #include "body/hull_point.h"
 #include "contact/local_bend.h"
+#include "contact/overlap/closing.h"
 
 namespace nurbs {
 namespace {
 
 constexpr int kMostCells = 2400;
-constexpr int kBeforeHopeless = 600;    // of them, after which it ends ...
-constexpr double kHopeless = 0.1;       // ... where less than this times their share of all is closed
+constexpr int kBeforeHopeless = 600;    // of them, after which a hopeless one ends
 constexpr int kFirstCells = 2;          // per edge of the cube
-constexpr int kDeepest = 26;            // halvings
+constexpr int kMostHalvings = 26;       // halvings
 constexpr int kPieces = 6;              // of a body that are looked at
 constexpr int kMeans = 7;               // pairs of pieces that are weighed
-constexpr double kClosedShare = 0.9;    // of the tolerance, at which a cell is closed
 constexpr double kMostNoise = 0.05;     // of the tolerance
 constexpr double kWidest = 0.5;         // rad: no bends are asked for beyond
-constexpr double kChord = 1.05;         // up to that, an angle over its chord or sine is less
 constexpr double kAxial = 3;            // of a cell's half width: nearer to an axis circles are points
 constexpr double kRounded = 1 - 1e-12;  // of a profile's radii
 constexpr double kNarrow = 2e-3;        // rad: in cells of less, three pieces may be level
@@ -345,14 +343,14 @@ class CellSearch {
   }
 
   bool close() {
-    Cell stack[6 * kFirstCells * kFirstCells + 3 * kDeepest + 4];
+    Cell stack[6 * kFirstCells * kFirstCells + 3 * kMostHalvings + 4];
     int top = 0, cells = 0;
     for (int face = 0; face < 6; ++face)
       for (int i = 0; i < kFirstCells; ++i)
         for (int j = 0; j < kFirstCells; ++j)
           stack[top++] = {face, (2 * i + 1.0) / kFirstCells - 1, (2 * j + 1.0) / kFirstCells - 1,
                           1.0 / kFirstCells};
-    const double smallest = 1.0 / kFirstCells / (1 << kDeepest) * 1.5;
+    const double smallest = 1.0 / kFirstCells / (1 << kMostHalvings) * 1.5;
     double closed = 0;  // of the cube's faces
     while (top > 0) {
       if (++cells > kMostCells || (cells > kBeforeHopeless && closed * kMostCells < kHopeless * cells))

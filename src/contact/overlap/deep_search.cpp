@@ -21,7 +21,7 @@ constexpr int kSupportDepth = 6;  // from which supports are evaluated
 constexpr int kMostSupports = 28;
 constexpr int kBeforeWidening = 4;  // supports before a cap is widened, and between that and the next
 constexpr int kMostWidening = 100;  // points spent on that
-constexpr int kMostCells = 800;
+constexpr int kMostDirectionCells = 800;
 constexpr int kMostNewtons = 12;
 constexpr int kMostCaps = 8;
 constexpr int kStretches = static_cast<int>(kStretchCaps.size()), kCaps = static_cast<int>(kInnerCaps.size());
@@ -478,7 +478,7 @@ class DeepSearch {
 
   bool rest() {
     while (count_ > 0) {
-      if (++cells_ > kMostCells) return false;
+      if (++cells_ > kMostDirectionCells) return false;
       const DirectionCell cell = cell_[--count_];
       const Corners corners(cell);
       if (excluded(cell, corners)) continue;

@@ -11,13 +11,13 @@
 namespace nurbs {
 namespace {
 
-constexpr double kShare = 0.5;       // of the tolerance, between the overlap and its level
-constexpr double kMostNoise = 0.1;   // of it, that round-off of a test may take
-constexpr double kNoise = 2e-15;     // of a matrix
-constexpr int kMostTests = 200;      // 30 to 60 are usual; the polytope closes in as long
-constexpr int kMostWeights = 100;    // m tried in one
-constexpr double kWidest = 1;        // interval, of the logarithm of the ratio
-constexpr double kNarrowest = 1e-9;  // ... which is none any more
+constexpr double kDepthShare = 0.5;     // of the tolerance, between the overlap and its level
+constexpr double kRoundoffShare = 0.1;  // of it, that round-off of a test may take
+constexpr double kNoise = 2e-15;        // of a matrix
+constexpr int kMostTests = 200;         // 30 to 60 are usual; the polytope closes in as long
+constexpr int kMostWeights = 100;       // m tried in one
+constexpr double kWidestInterval = 1;   // interval, of the logarithm of the ratio
+constexpr double kNoInterval = 1e-9;    // ... which is none any more
 constexpr double kLargeRatio = 1e15;
 constexpr double kLargeShare = 1e6;  // of a matrix, beyond which its last axis is nearly an eigenvector
 constexpr double kNarrower = 0.4, kWider = 2;
@@ -99,7 +99,7 @@ class Search {
   };
 
   double overlap(const Vec3& d) const { return a_.height(d) + b_.height(d) - offset_.dot(d); }
-  double level() const { return best_ - kShare * tolerance_; }
+  double level() const { return best_ - kDepthShare * tolerance_; }
 
   double least_ratio() const {
     return a_.least > 0 && b_.most > 0 ? a_.least / b_.most * (1 - kBoundRoundoff) : 0;
@@ -192,7 +192,8 @@ class Search {
     if (b_.most == 0) return only_one();
     const double low = least_ratio(), high = most_ratio(), first = std::clamp(ratio(best_d_), low, high);
     const double ha = a_.height(best_d_), hb = b_.height(best_d_);
-    const double widest = std::min(kWidest, std::sqrt(kShare * tolerance_ * (ha + hb) / (ha * hb)));
+    const double widest =
+        std::min(kWidestInterval, std::sqrt(kDepthShare * tolerance_ * (ha + hb) / (ha * hb)));
     return go(first, high, widest) && go(first, low, widest);
   }
 
@@ -218,7 +219,7 @@ class Search {
       Vec3 lower;
       if (overlaps(up ? Ratios{from, to} : Ratios{to, from}, &lower)) {
         from = to;
-        width = std::min(kWider * width, kWidest * (1 + std::abs(std::log(from))));
+        width = std::min(kWider * width, kWidestInterval * (1 + std::abs(std::log(from))));
         continue;
       }
       if (tests_ > kMostTests || out_of_digits_) return false;
@@ -230,7 +231,7 @@ class Search {
         if (best_ < before - kBeside * tolerance_) continue;
       }
       width *= kNarrower;
-      if (width < kNarrowest) return false;
+      if (width < kNoInterval) return false;
     }
     return true;
   }
@@ -256,7 +257,7 @@ class Search {
     Mat3 m = of_a * square_a_ + of_b * square_b_;
     const double size2_a = of_a * a_.most * a_.most, size2_b = of_b * b_.most * b_.most, depth = level(),
                  depth2 = depth * depth, noise = kNoise * (size2_a + (b_.is_segment() ? 0 : size2_b));
-    out_of_digits_ = noise > kMostNoise * tolerance_ * depth;
+    out_of_digits_ = noise > kRoundoffShare * tolerance_ * depth;
     m.diagonal().array() -= noise;
     if (b_.is_segment()) m(2, 2) -= kNoise * size2_b;
     // By N^-1 o . o as a function of m, log of the sum is convex in the logarithm of m: Newton, in a bracket.

@@ -5,6 +5,7 @@
 #include <array>
 #include <cmath>
 
+#include "contact/overlap/closing.h"
 #include "nurbs/room.h"
 
 namespace nurbs {
@@ -16,25 +17,24 @@ constexpr long kPairWork = 4;        // ... as so many, supports as those of hal
 constexpr int kMostMade = 2048;      // pieces of a body that are made about an origin
 constexpr int kMostLeft = 1024;      // that wait for another origin, and ...
 constexpr int kMostCones = 64;       // ... cones of them
-constexpr int kAlwaysEvaluated = 16;  // pairs ...
-constexpr double kShare = 0.25;       // ... and those later that so much of their spread below ...
-constexpr double kGain = 0.1;         // ... would gain as much, of the tolerance
-constexpr double kSpent = 0.02;       // of the tolerance: what spreads less is not parted
-constexpr double kClosedShare = 0.9;  // of the tolerance, at which a pair of pieces is closed
-constexpr int kAsked = 32;            // directions along which p is remembered
-constexpr double kAsNear = 0.25;      // of a cone: p is not asked for again
-constexpr double kStartNear = 0.3;    // rad: supports are searched from there
-constexpr double kNearCones = 6;      // angles of a cone about which others are searched with it
+constexpr int kAlwaysEvaluated = 16;   // pairs ...
+constexpr double kSpreadShare = 0.25;  // ... and those later that so much of their spread below ...
+constexpr double kGain = 0.1;          // ... would gain as much, of the tolerance
+constexpr double kSpent = 0.02;        // of the tolerance: what spreads less is not parted
+constexpr int kAsked = 32;             // directions along which p is remembered
+constexpr double kAsNear = 0.25;       // of a cone: p is not asked for again
+constexpr double kStartNear = 0.3;     // rad: supports are searched from there
+constexpr double kNearCones = 6;       // angles of a cone about which others are searched with it
 constexpr int kMostOrigins = 200;
 constexpr double kCosineRoundoff = 1e-15;
-constexpr double kNoLength = 1e-100;  // has no direction, its square underflows
-constexpr double kInside = 0.3;       // of the inner radius: where origins lie
-constexpr double kNarrower = 0.5;     // than the cone before, at most
+constexpr double kNoLength = 1e-100;   // has no direction, its square underflows
+constexpr double kInside = 0.3;        // of the inner radius: where origins lie
+constexpr double kNarrowerCone = 0.5;  // than the cone before, at most
 
 // A body's pieces seen from an origin, and those that a pair has made besides.
-class Pieces {
+class SeenPieces {
  public:
-  explicit Pieces(const NearBall& body) : body_(body), known_(static_cast<int>(body.pieces.size())) {}
+  explicit SeenPieces(const NearBall& body) : body_(body), known_(static_cast<int>(body.pieces.size())) {}
   // Seen from elsewhere none is known but the patches.
   void see_from(const Vec3& origin) {
     origin_ = origin;
@@ -156,7 +156,7 @@ class NearBallSearch {
   }
   // Whether p may well be less than it is known to be, where the bound is least.
   bool is_promising(const Open& pair) const {
-    return pair.bound + kShare * (pair.spread + pair.loss) < best_ - kGain * tolerance_;
+    return pair.bound + kSpreadShare * (pair.spread + pair.loss) < best_ - kGain * tolerance_;
   }
 
   // False where there is no room left.
@@ -236,7 +236,7 @@ class NearBallSearch {
           waits_[kept++] = pair;
       }
       left_ = kept;
-      if (cones_ < kMostCones && cone.angle <= kNarrower * cone_.angle)
+      if (cones_ < kMostCones && cone.angle <= kNarrowerCone * cone_.angle)
         more_[cones_++] = cone;
       else
         least_ = std::min(least_, cone.bound);
@@ -245,7 +245,7 @@ class NearBallSearch {
 
   // Moves both origins to where the bodies' supports along d are seen along it.
   bool look_along(const Vec3& d) {
-    const auto look = [&](const Shape& shape, const Vec3& own, Pieces* pieces) {
+    const auto look = [&](const Shape& shape, const Vec3& own, SeenPieces* pieces) {
       const Vec3 origin =
           find_hull_support(shape, own, nullptr, tolerance_).point - shape.near_ball().radius * own;
       if (!(origin.norm() < kInside * shape.inner_radius)) return false;
@@ -288,7 +288,7 @@ class NearBallSearch {
 
   const PairFrame& pair_;
   double tolerance_;
-  Pieces a_, b_;
+  SeenPieces a_, b_;
   long opened_ = 0;
   double best_ = kFarAway, least_ = kFarAway;
   Vec3 direction_ = Vec3::UnitX();

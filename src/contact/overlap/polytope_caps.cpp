@@ -2,6 +2,7 @@
 // polytope_search.h.
 #include <cmath>
 
+#include "contact/overlap/closing.h"
 #include "contact/overlap/polytope_search.h"
 
 namespace nurbs {
@@ -9,14 +10,13 @@ namespace {
 
 constexpr double kCapDepth = 0.4;  // of the tolerance, that a cap proves less than the least overlap
 constexpr double kCapUsed = 0.8;   // of a cap's angle: the rest is for lower minima found later
-constexpr double kWidestCap = 0.42, kLeastCap = 1e-4, kNextCap = 0.75;  // rad
+constexpr double kWidestCap = 0.42, kNarrowestCap = 1e-4, kNextCap = 0.75;  // rad
 // A cap whose bodies are cut to their cores about it:
-constexpr double kOffSupport = 1e-4;  // rad
-constexpr double kSameBasin = 0.97;   // cosine
-constexpr double kCoreDepth = 0.98;   // of the overlap
-constexpr int kCorePoints = 320;      // spent on one
-constexpr int kRim = 8;               // points that give away what is outside
-constexpr double kWorthCores = 0.6;   // of the points that the minimum would cost without
+constexpr double kOffSupport = 1e-4;   // rad
+constexpr double kSameWitness = 0.97;  // cosine
+constexpr int kCorePoints = 320;       // spent on one
+constexpr int kRim = 8;                // points that give away what is outside
+constexpr double kWorthCores = 0.6;    // of the points that the minimum would cost without
 constexpr std::array<double, 8> kCoreCaps = {0.4, 0.25, 0.16, 0.11, 0.075, 0.048, 0.03, 0.015};  // rad
 
 }  // namespace
@@ -42,7 +42,7 @@ double PolytopeSearch::cover(int v) {
   const double y0 = d.dot(g), slope = (g - y0 * d).norm() + pair_.noise,
                over = std::max(0.0, w.p - shrink_ - y0) + roundoff() + pair_.rise;
   double angle = 0;
-  for (double to = kWidestCap; to > kLeastCap; to *= kNextCap) {
+  for (double to = kWidestCap; to > kNarrowestCap; to *= kNextCap) {
     double rate = 0;
     const Mat2 turn = least_turn(a, to, &rate) + least_turn(b, to, &rate);
     const double m = extremes(turn).least - shrink_;
@@ -76,7 +76,7 @@ void PolytopeSearch::cover_by_cores() {
     if (near < 0 || upper_ - lower_ <= tolerance_) return;
     int v = -1;
     for (int k = 0; k < hull_.points(); ++k)
-      if (!witness_[k].cap && witness_[k].d.dot(direction_to_ask_) > kSameBasin &&
+      if (!witness_[k].cap && witness_[k].d.dot(direction_to_ask_) > kSameWitness &&
           (v < 0 || witness_[k].p < witness_[v].p))
         v = k;
     if (v < 0 || !(witness_[v].p + lower_ <= kSurroundAbove * std::abs(lower_)) || !cover_by_cores(v)) return;

@@ -1,12 +1,12 @@
 // What circles say of a sector; derived in ring_search.h and below.
+#include "contact/overlap/closing.h"
 #include "contact/overlap/ring_sectors.h"
 
 namespace nurbs {
 namespace {
 
-constexpr int kBeside = 3;              // circles looked at on either side of a range of angles
+constexpr int kCirclesBeside = 3;       // circles looked at on either side of a range of angles
 constexpr double kNearAzimuth = 0.3;    // rad, of a circle's asked azimuth
-constexpr double kChord = 1.05;         // up to 0.5 rad: no less than the angle over its chord or sine
 constexpr double kWidestSecond = 0.88;  // cosine of that
 constexpr double kOffRipple = 3;        // times the most it is off by, a circle is known all round
 constexpr double kNextFar = 1e-3;       // sine between the angles of rippled circles that are not
@@ -66,9 +66,9 @@ void RingSectors::choose(const Sector& sector, double half) {
            2 - 2 * (c.u.c * u.c + c.u.s * u.s) <= square(reach);
   };
   chosen_ = 0;
-  for (int i = first - 1, beside = 0; i >= 0 && beside < kBeside; --i) {
+  for (int i = first - 1, beside = 0; i >= 0 && beside < kCirclesBeside; --i) {
     const bool counts = near(flat_[order_[i]]);
-    if (counts || first - i <= kBeside) which_[chosen_++] = order_[i];
+    if (counts || first - i <= kCirclesBeside) which_[chosen_++] = order_[i];
     beside += counts;
   }
   const FlatCircle* before_it = nullptr;  // of those far off one an angle tells as much as all
@@ -78,9 +78,9 @@ void RingSectors::choose(const Sector& sector, double half) {
     which_[chosen_++] = order_[i];
     before_it = &c;
   }
-  for (int i = last, beside = 0; i < count_ && beside < kBeside; ++i) {
+  for (int i = last, beside = 0; i < count_ && beside < kCirclesBeside; ++i) {
     const bool counts = near(flat_[order_[i]]);
-    if (counts || i - last < kBeside) which_[chosen_++] = order_[i];
+    if (counts || i - last < kCirclesBeside) which_[chosen_++] = order_[i];
     beside += counts;
   }
 }

@@ -1,6 +1,8 @@
 // The search; see ring_sectors.h.
 #include "contact/overlap/ring_sectors.h"
 
+#include "contact/overlap/closing.h"
+
 namespace nurbs {
 namespace {
 
@@ -10,17 +12,15 @@ constexpr double kMostSpentLast = 2400;    // ... where nothing else did
 constexpr double kMostCompared = 4e5;      // circles in their hulls, 0.5 ns each
 constexpr double kMostComparedLast = 4e6;  // ... where nothing else did
 constexpr double kOnPace = 9;              // times the share closed, that may be spent where nothing else did
-constexpr double kFirstSpent = 0.25;       // of either, after which it ends ...
+constexpr double kFirstSpent = 0.25;       // of either, after which a hopeless one ends ...
 constexpr double kFirstSpentLast = 0.375;  // ... and where nothing else did
-constexpr double kHopeless = 0.1;          // ... where less than this times its share of all is closed
 constexpr int kDeepestSector = 60;         // halvings of the azimuth
-constexpr double kNearlyAlike = 0.1;    // of the body's radius: what directions of a ring may differ by ...
-constexpr double kHardlyAlike = 0.4;    // ... where nothing else did
-constexpr double kMostNoise = 0.5;      // of the tolerance, that bodies may be off those of revolution
-constexpr double kClosedShare = 0.9;    // of the tolerance at which a sector is closed ...
-constexpr double kMeridianShare = 0.4;  // ... and below which its width, not its circles, keeps it open
-constexpr double kLeastTilt = 3e-3;     // sine between the axes from which the mate's tip may do better
-constexpr double kCoreDepth = 0.98;     // ... and of the overlap
+constexpr double kNearlyAlike = 0.1;  // of the body's radius: what directions of a ring may differ by ...
+constexpr double kHardlyAlike = 0.4;  // ... where nothing else did
+constexpr double kMostOff = 0.5;      // of the tolerance, that bodies may be off those of revolution
+constexpr double kMeridianShare =
+    0.4;  // of the tolerance, below which its width, not its circles, keeps a sector open
+constexpr double kLeastTilt = 3e-3;  // sine between the axes from which the mate's tip may do better
 constexpr int kFirstAngles = 7;
 constexpr int kRippledCost = 3;           // sectors, as one of rippled circles, ...
 constexpr double kFollowedCost = 25;      // ... besides one for so many that are followed
@@ -50,7 +50,7 @@ bool RingSectors::run(bool last, double* left, PolytopeResult* result) {
   view_.ball_k = std::min(view_.ball_k, std::max(0.0, depth - view_.ball));
   best_ = -result->bracket.lower - balls();
   best_e_ = e;
-  if (!(best_ > tolerance_ && noise_ <= kMostNoise * tolerance_) || !query(e)) return false;
+  if (!(best_ > tolerance_ && noise_ <= kMostOff * tolerance_) || !query(e)) return false;
   choose_mate(e);
   const double alike = differ() / (view_.scale_k * view_.k->bounding_radius);
   if (!(alike < (last ? kHardlyAlike : kNearlyAlike))) return false;

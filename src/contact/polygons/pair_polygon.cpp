@@ -72,7 +72,8 @@ class FaceContact {
   bool make(double overlap, double reach, ContactPolygon* out, bool* swallowed) {
     *swallowed = false;
     const double most = reach - overlap;
-    if (!face_points(most, swallowed) && !crease_points(most) && !line_points(most)) return false;
+    if (!face_points(most, swallowed) && !crease_points(overlap, most) && !line_points(overlap, most))
+      return false;
     if (!finish(points_, reach, nullptr, out)) return false;
     out->reference = reference_.index;
     if (whole_ && ring_ >= 0) set_ring(*incident_.shape, incident_.index, ring_, out);
@@ -256,13 +257,14 @@ class FaceContact {
     return out->within(most);
   }
 
-  bool crease_points(double most) {
+  bool crease_points(double overlap, double most) {
     bool found = false;
     for (const StraightEdge& edge : incident_.shape->flats.edges) {
       Candidates other;
       bool uncut = false;
       if (!segment({incident_.vertex(edge.ends[0]), incident_.vertex(edge.ends[1])}, edge.ends, most, &other,
-                   &uncut))
+                   &uncut) ||
+          !other.bears(overlap))
         continue;
       if (found && other.gap[0] + other.gap[1] >= points_.gap[0] + points_.gap[1]) continue;
       found = true;
@@ -286,12 +288,12 @@ class FaceContact {
     return ruled_line(shape, support->where, down(), kLineAngle, line);
   }
 
-  bool line_points(double most) {
+  bool line_points(double overlap, double most) {
     RuledLine line;
     Support support;
     if (!incident_line(&line, &support) ||
         !is_on_line(*incident_.shape, support.point, line.ends[0], line.ends[1]) ||
-        !segment(line.ends, {-1, -1}, most, &points_, &whole_))
+        !segment(line.ends, {-1, -1}, most, &points_, &whole_) || !points_.bears(overlap))
       return false;
     ruled_ = true;
     return true;
@@ -329,7 +331,8 @@ bool support_line(const Body& body, const Vec3& d, double tolerance, double smal
   const Vec3 on_body = body.turned_back(d);
   const SupportSet set = support_set(*body.shape, on_body, tolerance / body.frame.scale);
   if (set.count != 2 || (set.ruled && !is_on_line(*body.shape, set.support, set.point[0], set.point[1]))) {
-    *room = body.shape->flats.edges.empty() ? turn_room(body, set.where, on_body, smaller) : 0;
+    *room =
+        body.shape->flats.edges.empty() && set.face < 0 ? turn_room(body, set.where, on_body, smaller) : 0;
     return false;
   }
   for (int i = 0; i < 2; ++i) {
@@ -440,7 +443,8 @@ bool line_contact(const Body& a, const Body& b, Vec3 d, double overlap, double r
     points.add(plane.project(x), b.to_shape(x), plane.height(x),
                cut ? vertex_id(0, on_a.vertex[at > 0 ? 1 : 0]) : vertex_id(1, on_b.vertex[i]));
   }
-  if (!points.within(reach - overlap) || !finish(points, reach, nullptr, out)) return false;
+  if (!points.within(reach - overlap) || !points.bears(overlap) || !finish(points, reach, nullptr, out))
+    return false;
   out->reference = 0;
   out->factor = 1;
   const Vec3 local = a.turned_back(plane.normal);

@@ -70,6 +70,10 @@ struct Candidates {
   bool within(double most) const {
     return std::all_of(gap, gap + plane.count, [&](double g) { return g <= most; });
   }
+  // Whether the contact is theirs: one of them is half as deep at least.
+  bool bears(double overlap) const {
+    return std::any_of(gap, gap + plane.count, [&](double g) { return g <= -0.5 * overlap; });
+  }
 };
 
 // Of a polygon, and the two corners that are furthest apart.

@@ -20,10 +20,10 @@
 namespace nurbs {
 namespace {
 
-constexpr double kLevel = 1e-9;  // of the overlap: maxima that are one ...
-constexpr double kSize = 1e-12;  // ... and of the bounding radius
-constexpr double kNone = 1e-12;  // sides of a cone that are next to nothing
-constexpr int kMostLooks = 400;  // of which some 60 are needed
+constexpr double kSameHeight = 1e-9;  // of the overlap: maxima that are one ...
+constexpr double kSize = 1e-12;       // ... and of the bounding radius
+constexpr double kNone = 1e-12;       // sides of a cone that are next to nothing
+constexpr int kMostLooks = 400;       // of which some 60 are needed
 constexpr int kMostCuts = 6;
 constexpr double kProgress = 0.5;  // of a bound's way down to the best, that a cut must make for another
 
@@ -63,7 +63,7 @@ class ConeSearch {
       Piece top = pieces_.back();
       pieces_.pop_back();
       const double best = best_ < 0 ? level : std::max(level, looks_[best_].at.gap);
-      if (!(top.bound > best + kLevel * std::abs(best) + kSize * size_)) break;
+      if (!(top.bound > best + kSameHeight * std::abs(best) + kSize * size_)) break;
       if (!look(top.where)) return last();
       add_cut(&top);
       const double before = top.bound, above = looks_[best_].at.gap;

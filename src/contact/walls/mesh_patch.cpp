@@ -17,7 +17,7 @@ double longest_side2(const Triangle& t) {
 
 // Twice the area over the squared longest side: below this a triangle has no plane of its own.
 constexpr double kNoArea = 1e-12;
-constexpr double kSamePlane = 1e-3;  // of the distance within which corners are one: planes are, at least
+constexpr double kOnePlane = 1e-3;  // of the distance within which corners are one: planes are, at least
 
 }  // namespace
 
@@ -25,7 +25,7 @@ void MeshPatch::build(const Triangle* triangles, int count, double distance, dou
   unbounded_ = false;
   weld(triangles, count, distance);
   split_sides(distance);
-  find_planes(triangles, std::max(flat, kSamePlane * distance));
+  find_planes(triangles, std::max(flat, kOnePlane * distance));
   find_edges();
   link_vertices();
   place();

@@ -103,7 +103,8 @@ class SurfaceSearch {
   double inside(const ActivePlane& met, const MeshPatch::Plane& plane, const MeshPatch::Edge& e) const;
   bool holds(int number, const ActivePlane& met) const;
   int cell_below(int number);
-  bool is_over(int number, const Vec3& x) const;
+  int cell_with(int number, const Vec3& x) const;
+  Vec3 crossing(int number, const Vec3& deepest, double gap) const;
   bool in_cell(const MeshPatch::Cell& cell, const Vec3& x) const;
   void touch_face(int number);
   void add_corners(int cell, std::vector<Vec3>* corners) const;
@@ -112,6 +113,7 @@ class SurfaceSearch {
   bool add_plane(int number, int triangle, bool flat, double gap, const Vec3& on_body);
   int add(const SurfaceContact& c);
   void leave_out_dropped();
+  void touch_any(const std::vector<int>& active);
 
   // Edges and vertices by their index.
   bool range(const MeshPatch::Edge& e, Range* r) const;
@@ -162,6 +164,8 @@ class SurfaceSearch {
   static constexpr double kLineLength = 1e-4;  // of the bounding radius: of a point there is less
   static constexpr double kStraightOn = 1 - 1e-12;  // cosine
   static constexpr double kWithin = 1e-9;           // of the bounding radius: on a cell
+  static constexpr double kPoked =
+      0.1;  // of the bounding radius: deeper planes have nothing to do with the wall
 
   const Particle& particle_;
   MeshPatch& patch_;

@@ -51,7 +51,25 @@ void SurfaceSearch::run() {
     }
   }
   leave_out_dropped();
+  if (out_.count == 0 && !out_.full && edged(*particle_.shape)) touch_any(active);
   if (out_.count > 0) out_.expiry = -kFarAway;
+}
+
+// A sharp body that pokes through the wall beside the line where that turns up: the deepest point is beyond
+// the line, so that no face has it, and the body is clear of the plane on the other side, or of the line. The
+// contact is that of the shallowest plane that the body crosses within a cell.
+void SurfaceSearch::touch_any(const std::vector<int>& active) {
+  int shallowest = -1, cell = -1;
+  for (const int p : active) {
+    const ActivePlane& met = planes_[p];
+    if (met.result.gap < -kPoked * radius_ || !(met.normal.dot(met.deepest) < 0)) continue;
+    if (shallowest >= 0 && met.result.gap <= planes_[shallowest].result.gap) continue;
+    const int crossed = cell_with(p, crossing(p, met.deepest, met.result.gap));
+    if (crossed >= 0) shallowest = p, cell = crossed;
+  }
+  if (cell < 0) return;
+  const ActivePlane& met = planes_[shallowest];
+  add_plane(shallowest, patch_.cells()[cell].triangle, false, met.result.gap, met.deepest);
 }
 
 const PairMemory* SurfaceSearch::start_for(const Vec3& normal) const {
@@ -278,12 +296,20 @@ int SurfaceSearch::cell_below(int number) {
   return -1;
 }
 
-// Whether a point is above, or below, a cell of a plane.
-bool SurfaceSearch::is_over(int number, const Vec3& x) const {
+// The cell of a plane that a point is above, or below; -1: none.
+int SurfaceSearch::cell_with(int number, const Vec3& x) const {
   const MeshPatch::Plane& plane = patch_.planes()[number];
-  for (int i = 0; i < plane.cells; ++i)
-    if (in_cell(patch_.cells()[patch_.cell_in(plane.first + i)], x)) return true;
-  return false;
+  for (int i = 0; i < plane.cells; ++i) {
+    const int cell = patch_.cell_in(plane.first + i);
+    if (in_cell(patch_.cells()[cell], x)) return cell;
+  }
+  return -1;
+}
+
+// Of the line from the centre to the deepest point, all of which the body has, the point in the plane; the
+// centre is above it.
+Vec3 SurfaceSearch::crossing(int number, const Vec3& deepest, double gap) const {
+  return particle_.x + deepest - gap / planes_[number].normal.dot(deepest) * deepest;
 }
 
 bool SurfaceSearch::in_cell(const MeshPatch::Cell& cell, const Vec3& x) const {
@@ -307,9 +333,8 @@ void SurfaceSearch::touch_face(int number) {
 // side of the plane, as the body passes by the face's border.
 bool SurfaceSearch::passes_by(int number, const Vec3& deepest, double gap) const {
   if (patch_.unbounded() || !finds_sharp(gap)) return false;
-  // Of the line from the centre to the deepest point, all of which the body has, the point in the plane.
-  const double slope = planes_[number].normal.dot(-deepest);
-  if (slope > 0 && is_over(number, particle_.x + deepest + gap / slope * deepest)) return false;
+  if (planes_[number].normal.dot(deepest) < 0 && cell_with(number, crossing(number, deepest, gap)) >= 0)
+    return false;
   const MeshPatch::Plane& plane = patch_.planes()[number];
   std::vector<Vec3>& corners = workspace().corners;
   bool over = false;
