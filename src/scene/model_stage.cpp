@@ -34,15 +34,16 @@ double volume_curvature(const Particle& p) {
 
 // Rolling friction takes the effective radius for its lever, which is right for spheres. Of other bodies the
 // lever is the height of their centres over the axis through the contact about which the torque turns, so
-// that one rolls down slopes steeper than the coefficient. The ratio.
-double rolling_lever(const ModelContact& c, const ContactGeometry& g) {
-  const double torque = c.torque.norm();
-  if (!(torque > 0)) return 1;
-  const auto height = [&](const Vec3& arm) { return arm.cross(c.torque).norm() / torque; };
+// that one rolls down slopes steeper than the coefficient. Torsion keeps the radius.
+Vec3 rolling_torque(const ModelContact& c, const ContactGeometry& g) {
+  const Vec3 torsion = c.torque.dot(g.normal) * g.normal, rolling = c.torque - torsion;
+  const double size = rolling.norm();
+  if (!(size > 0)) return c.torque;
+  const auto height = [&](const Vec3& arm) { return arm.cross(rolling).norm() / size; };
   const double of_b = height(g.arm_b - 0.5 * g.overlap * g.normal);
-  if (c.a < 0) return of_b / c.radius_b;
+  if (c.a < 0) return torsion + of_b / c.radius_b * rolling;
   const double of_a = height(g.arm_a + 0.5 * g.overlap * g.normal);
-  return of_a * of_b / (of_a + of_b) * (1 / c.radius_a + 1 / c.radius_b);
+  return torsion + of_a * of_b / (of_a + of_b) * (1 / c.radius_a + 1 / c.radius_b) * rolling;
 }
 
 }  // namespace
@@ -152,7 +153,7 @@ void ContactStages::ask_model(ContactBlock& block, int lane, const ContactGeomet
   step_.model->force(c);
 
   const double weight = block.field[kWeight][lane];
-  const Vec3 force = weight * c.force, torque = weight * rolling_lever(c, g) * c.torque;
+  const Vec3 force = weight * c.force, torque = weight * rolling_torque(c, g);
   if (!std::isfinite(force.sum() + torque.sum())) {
     counts_.value[ContactCounts::unresolved] += share(a, b);
     std::fill_n(pool_.memory(block, lane), pool_.memory_size(), 0.0);
