@@ -43,6 +43,7 @@ Vec3 rolling_torque(const ModelContact& c, const ContactGeometry& g) {
   const double of_b = height(g.arm_b - 0.5 * g.overlap * g.normal);
   if (c.a < 0) return torsion + of_b / c.radius_b * rolling;
   const double of_a = height(g.arm_a + 0.5 * g.overlap * g.normal);
+  if (!(of_a * of_b > 0)) return torsion;
   return torsion + of_a * of_b / (of_a + of_b) * (1 / c.radius_a + 1 / c.radius_b) * rolling;
 }
 
