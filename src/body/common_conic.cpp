@@ -4,14 +4,12 @@
 #include <Eigen/Eigenvalues>
 #include <Eigen/SVD>
 #include <cmath>
-#include <limits>
 
 #include "nurbs/tolerances.h"
 
 namespace nurbs {
 namespace {
 
-constexpr double kNone = std::numeric_limits<double>::infinity();
 constexpr int kPoints = 9;         // of each curve, that the conic is fitted to
 constexpr int kConicHalvings = 4;  // of a curve, in pieces
 constexpr double kWay = 0.5;       // cosine between a derivative and its piece's direction, at least ...
@@ -60,10 +58,10 @@ double most(const Scalars& f, const Scalars& w) {
 
 // Bounds of a curve against the conic.
 struct Fit {
-  double value = 0;         // |q|, at most
-  double gradient = kNone;  // |grad q|, at least
-  double off = 0;           // distance from the plane
-  bool forward = true;      // without turning back
+  double value = 0;             // |q|, at most
+  double gradient = kInfinity;  // |grad q|, at least
+  double off = 0;               // distance from the plane
+  bool forward = true;          // without turning back
 };
 
 void see(const Homogeneous& curve, const Conic& q, int depth, Fit* fit) {
@@ -97,7 +95,7 @@ void see(const Homogeneous& curve, const Conic& q, int depth, Fit* fit) {
 
 double distance(const Fit& f, const Conic& q) {
   const double bend = 2 * (std::abs(q[0]) + std::abs(q[1]) + std::abs(q[2]));
-  if (!(f.forward && f.gradient > 0 && f.value * bend <= kNewton * f.gradient * f.gradient)) return kNone;
+  if (!(f.forward && f.gradient > 0 && f.value * bend <= kNewton * f.gradient * f.gradient)) return kInfinity;
   return 2 * f.value / f.gradient + f.off;
 }
 
@@ -116,7 +114,7 @@ double common_conic_gap(const Homogeneous& one, const Homogeneous& other, bool r
     size = std::max(size, x.norm());
     spread += x * x.transpose();
   }
-  if (!(size > 0 && along <= kSameWay * size)) return kNone;
+  if (!(size > 0 && along <= kSameWay * size)) return kInfinity;
   const Eigen::SelfAdjointEigenSolver<Mat3> solver(spread);
   const Mat3 axes =
       solver.eigenvectors().rowwise().reverse().transpose() / size;  // the plane's, then its normal

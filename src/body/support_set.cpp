@@ -2,7 +2,6 @@
 // between face, crease, line and point.
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
 #include "body/connectivity.h"
 #include "body/shape.h"
@@ -105,12 +104,12 @@ void each_line(const Shape& shape, const SurfacePoint& at, const Vec3& d, double
 }  // namespace
 
 bool ruled_line(const Shape& shape, const SurfacePoint& at, const Vec3& d, double angle, RuledLine* line) {
-  double best = -std::numeric_limits<double>::infinity();
+  double best = -kInfinity;
   each_line(shape, at, d, angle, [&](const RuledLine& other) {
     const double lowest = std::min(d.dot(other.ends[0]), d.dot(other.ends[1]));
     if (lowest > best) best = lowest, *line = other;
   });
-  return best > -std::numeric_limits<double>::infinity();
+  return best > -kInfinity;
 }
 
 double turn_to_ruled_line(const Shape& shape, const SurfacePoint& where, const Vec3& d) {
@@ -171,10 +170,10 @@ SupportSet support_set(const Shape& shape, const Vec3& d, double tolerance) {
 
 double feature_lag(const Shape& shape, const Vec3& d, double h, const SurfacePoint& where) {
   const FlatFeatures& flats = shape.flats;
-  double highest = -std::numeric_limits<double>::infinity();  // of the features' lowest points
+  double highest = -kInfinity;  // of the features' lowest points
   const int f = nearest_face(flats, d, kFaceCosine);
   if (f >= 0) {
-    double lowest = std::numeric_limits<double>::infinity();
+    double lowest = kInfinity;
     for (const int v : flats.faces[f].corners) lowest = std::min(lowest, d.dot(flats.vertices[v]));
     highest = lowest;
   }

@@ -1,9 +1,7 @@
 // What the stages of a step hand on to each other about the eight contacts of a block.
 #pragma once
 
-#include <algorithm>
-#include <cmath>
-
+#include "nurbs/wide.h"
 #include "scene/contact_stages.h"
 
 namespace nurbs {
@@ -35,6 +33,14 @@ inline Vec3 middle_of(const ContactResult& r) {
 void take_over(const ContactCoefficients& law, const ContactGeometry& g, const BodyMotion& a,
                const BodyMotion& b, double dt, const Vec3& spring, ContactState* state);
 
+// Of a contact's weight times the law's dampers. Contacts, or points together, that are stiffer than the law
+// says, because they took over from others, have dampers that grow as the root of the stiffness, so that the
+// ratio of damping, and with it the restitution, is the law's.
+template <class Real>
+NURBS_INLINE Real damper_divisor(const Real& weight, const Real& together) {
+  return root(larger<Real>(all<Real>(1), larger<Real>(weight, together)));
+}
+
 // Geometry in lab axes from A's centre of mass.
 struct alignas(64) ContactStages::Results {
   double gap[kBlock], lower[kBlock];
@@ -55,11 +61,8 @@ struct alignas(64) ContactStages::Results {
       offset[k][lane] = separation[k];
     }
   }
-  // The dampers of a contact of weight w are w times this. Of contacts, or points together, that are stiffer
-  // than the law says, because they took over from others, they grow as the root of the stiffness, so that
-  // the ratio of damping, and with it the restitution, is the law's.
   double damper_share(int lane, double weight) const {
-    return 1 / std::sqrt(std::max({1.0, weight, together[lane]}));
+    return 1 / damper_divisor<double>(weight, together[lane]);
   }
   Vec3 normal_of(int lane) const { return {normal[0][lane], normal[1][lane], normal[2][lane]}; }
   Vec3 offset_of(int lane) const { return {offset[0][lane], offset[1][lane], offset[2][lane]}; }

@@ -642,8 +642,7 @@ void ContactStages::apply_law(ContactBlock& block, int first, const Results& res
   const Wide index = lanes(block, kWeight, first), weight = magnitude(index);
   law.kn *= weight;
   law.kt *= weight;
-  const Wide one = all<Wide>(1), together = larger(weight, got(results.together)),
-             dampers = weight / root(larger(one, together));  // Results::damper_share
+  const Wide dampers = weight / damper_divisor<Wide>(weight, got(results.together));
   law.cn *= dampers;
   law.ct *= dampers;
   const BodyMotionOf<Wide> a = gather_motion(of_a), b = gather_motion(of_b);

@@ -259,6 +259,8 @@ class RollingFriction(unittest.TestCase):
     def test_a_body_rolls_down_slopes_steeper_than_the_coefficient(self):
         """Whatever its shape: a long pill on its side stopped where a ball rolled, since the effective radius, which is the
         lever of spheres, has its length. Thrown on slopes of 0.13 and 0.07, coefficient 0.1."""
+        materials = {"youngsModulus": 1e7, "poissonsRatio": 0.3, "coefficientRestitution": 0.3, "coefficientFriction": 0.6,
+                     "coefficientRollingFriction": 0.1}
         for name, shape, height in (("ball", deck.shape_file("sphere", radius=1), 1), ("spheroid", deck.shape_file("ellipsoid", 1, 2, 1), 1),
                                     ("pill", deck.shape_file("capsule", radius=1, length=4), 1),
                                     ("tablet", deck.shape_file("tablet", radius=1, height=1, rim=0.2), 1)):
@@ -278,11 +280,7 @@ region box block -1 3 -1 1 -1 1 units box
 create_box 1 box
 neighbor 0.003 bin
 neigh_modify delay 0
-fix m1 all property/global youngsModulus peratomtype 1e7
-fix m2 all property/global poissonsRatio peratomtype 0.3
-fix m3 all property/global coefficientRestitution peratomtypepair 1 0.3
-fix m4 all property/global coefficientFriction peratomtypepair 1 0.6
-fix m5 all property/global coefficientRollingFriction peratomtypepair 1 0.1
+{models.materials(materials, 1)}
 pair_style gran/nurbs model hertz tangential history rolling_friction {rolling}
 pair_coeff * *
 fix w all wall/nurbs plane 0 0 0 0 0 1 type 1 model hertz tangential history rolling_friction {rolling}

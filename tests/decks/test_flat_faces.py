@@ -427,10 +427,7 @@ communicate single vel yes
 {space}
 neighbor 0.003 bin
 neigh_modify delay 0
-fix m1 all property/global youngsModulus peratomtype 1e8
-fix m2 all property/global poissonsRatio peratomtype 0.3
-fix m3 all property/global coefficientRestitution peratomtypepair 1 0.5
-fix m4 all property/global coefficientFriction peratomtypepair 1 0.0
+{materials}
 pair_style gran/nurbs {style}
 pair_coeff * * {law}
 {bodies}
@@ -442,11 +439,18 @@ thermo 20000
 run 20000
 """
     HERTZ = "model hertz tangential no_history"
+    SPACE = "region box block -0.5 0.5 -0.5 0.5 -0.5 0.5 units box\ncreate_box 1 box"
+    MATERIALS = {"youngsModulus": 1e8, "poissonsRatio": 0.3, "coefficientRestitution": 0.5, "coefficientFriction": 0.0}
+
+    def run_deck(self, files, rebound, bodies, space=SPACE, style=HERTZ, law=""):
+        text = self.DECK.format(materials=models.materials(self.MATERIALS, 1), space=space, style=style, law=law, bodies=bodies,
+                                rebound=rebound)
+        return deck.run_ok(text, files=files).thermo["e"][-1]
 
     def rebound(self, shape, tilt, kn, mesh):
         files = {"body.json": shape}
         wall = "plane 0 0 0 0 0 1"
-        space = "region box block -0.5 0.5 -0.5 0.5 -0.5 0.5 units box\ncreate_box 1 box"
+        space = self.SPACE
         if mesh:
             files["floor.stl"] = meshes.ascii_stl([(-0.1, -0.1, 0), (0.1, -0.1, 0), (0.1, 0.1, 0), (-0.1, 0.1, 0)],
                                                   [(0, 1, 2), (0, 2, 3)])
@@ -457,9 +461,7 @@ run 20000
 create_atoms 1 single 0 0 0.00505 units box
 set group all density 2500 quat 1 0 0 {np.degrees(tilt)}
 set group all vz -0.4871"""
-        run = deck.run_ok(self.DECK.format(space=space, style="" if kn else self.HERTZ, law=law, bodies=bodies,
-                                           rebound="vcm(all,z)/0.4871"), files=files)
-        return run.thermo["e"][-1]
+        return self.run_deck(files, "vcm(all,z)/0.4871", bodies, space, "" if kn else self.HERTZ, law)
 
     def test_faces_that_are_not_quite_level(self):
         """A face that lands with a little tilt begins on one of its points, and all are as stiff as that one was. Dampers
@@ -484,10 +486,8 @@ group upper id 1
 group lower id 2
 set group all density 2500
 set atom 1 vz -0.5"""
-            run = deck.run_ok(self.DECK.format(space="region box block -0.5 0.5 -0.5 0.5 -0.5 0.5 units box\ncreate_box 1 box",
-                                               style=self.HERTZ, law="", bodies=bodies, rebound="(vcm(upper,z)-vcm(lower,z))/0.5"),
-                              files={"body.json": deck.shape_file("box", 0.01, 0.012, 0.015)})
-            self.assertAlmostEqual(run.thermo["e"][-1], 0.5, delta=5e-3, msg=apart)
+            rebound = self.run_deck({"body.json": deck.shape_file("box", 0.01, 0.012, 0.015)}, "(vcm(upper,z)-vcm(lower,z))/0.5", bodies)
+            self.assertAlmostEqual(rebound, 0.5, delta=5e-3, msg=apart)
 
 
 class Rebuilds(unittest.TestCase):

@@ -142,17 +142,18 @@ thermo_style custom step c_led[1] c_led[2] f_w0[3] c_st[8]
 thermo_modify norm no format float %.15g
 thermo 4000
 run 4000
-set atom 1 vx 0.0
-run 0
-run 0
-run 0
 """
+        empty = "set atom 1 vx 0.0\n" + 3 * "run 0\n"
+        text += empty + 2 * ("run 1\n" + empty)
         r = deck.run_ok(text, files={"capsule.json": deck.ROOT / "examples/shapes/capsule.json"})
         self.assertGreater(r.tables[0]["st[8]"][-1], 50)
-        # In the last step a contact's effective radius may have followed the curvature by a stride (model_stage.cpp).
-        self.assertAlmostEqual(r.thermo["led[1]"][-1] / r.tables[0]["led[1]"][-1], 1, delta=1e-5)
-        for name in ("led[1]", "led[2]", "w0[3]", "st[8]"):
-            self.assertEqual(r.tables[1][name][-1], r.thermo[name][-1], name)
+        # Where a contact's effective radius has just followed the curvature by a stride (model_stage.cpp), the energy is off by that.
+        off = [abs(r.tables[k + 1]["led[1]"][-1] / r.tables[k]["led[1]"][-1] - 1) for k in (0, 4, 8)]
+        self.assertLess(min(off), 1e-9)
+        self.assertLess(max(off), 1e-5)
+        for k in (1, 5, 9):
+            for name in ("led[1]", "led[2]", "w0[3]", "st[8]"):
+                self.assertEqual(r.tables[k][name][-1], r.tables[k + 2][name][-1], name)
 
     def test_a_run_in_two_parts_is_one(self):
         half = ON_MESH.format(at="0.3 0.2 0.61", law=LAW)

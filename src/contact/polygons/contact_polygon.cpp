@@ -18,7 +18,7 @@ double sector_gap(const FlatFeatures& flats, int face, int i, double base, const
   const FlatFace& f = flats.faces[face];
   const Sector s = sector(i, static_cast<int>(f.outline.size()));
   Vec3 pressed = Vec3::Zero();
-  double force = 0, weight = 0, least = kInfinite;
+  double force = 0, weight = 0, least = kInfinity;
   for (int k = s.first; k < s.last; ++k) {
     const Vec3& x = flats.vertices[f.outline[k]];
     const double gap = base + slope.dot(x), share = f.weight[k] * std::max(0.0, -gap);
@@ -58,8 +58,8 @@ PolygonState evaluate(const ContactPolygon& polygon, const BodyFrame& a, const B
   // Relative to the reference's centre, so that bodies far from the lab's origin keep their digits.
   const Vec3 apart = incident.x - reference.x;
   const double level = reference.scale * polygon.offset;
-  state.least = kInfinite;
-  state.most = -kInfinite;
+  state.least = kInfinity;
+  state.most = -kInfinity;
   const Vec3 outward_on_incident = incident.scale * (incident.axes.transpose() * outward);
   const double base = outward.dot(apart) - level;
   double energy = 0;
@@ -84,7 +84,7 @@ PolygonState evaluate(const ContactPolygon& polygon, const BodyFrame& a, const B
     (a_is_reference ? state.arm_a : state.arm_b)[i] = middle + apart;
   }
   state.energy = 0.5 * energy;
-  if (polygon.count > 0 && polygon.room < kInfinite) {
+  if (polygon.count > 0 && polygon.room < kInfinity) {
     const auto lateral = [&](int i, const double* mark) {
       const Vec3 x =
           apart + incident.scale * (incident.axes * load(polygon.point[i])) - reference.axes * load(mark);
@@ -181,7 +181,7 @@ void match(const ContactPolygon& old_polygon, const PolygonState& old_state,
            const ContactPolygon& new_polygon, const PolygonState& new_state, int* source) {
   for (int i = 0; i < new_polygon.count; ++i) {
     source[i] = -1;
-    double least = kInfinite;
+    double least = kInfinity;
     for (int j = 0; j < old_polygon.count; ++j) {
       if (new_polygon.id[i] != 0 && new_polygon.id[i] == old_polygon.id[j]) {
         source[i] = j;

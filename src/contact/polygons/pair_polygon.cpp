@@ -144,7 +144,7 @@ class FaceContact {
 
   // Of room(): the face opposite is either elsewhere, or has a place over the reference that is high.
   double face_room(const Opposite& o, double most) const {
-    if (o.face < 0) return kInfinite;
+    if (o.face < 0) return kInfinity;
     const FlatFace& face = incident_.shape->flats.faces[o.face];
     const Vec2 middle = plane_.project(reference_.place(face_.centroid)),
                other = plane_.project(incident_.place(face.centroid));
@@ -375,7 +375,7 @@ Vec3 least_across(const Body& a, const Body& b, const Vec3& u, const Vec3& d) {
     return (x - y).dot(u.cross(e));
   };
   double last = 0, at_last = slope(last), angle = std::clamp(-at_last / size, -kMostAcross, kMostAcross);
-  double low = at_last < 0 ? 0 : -kInfinite, high = at_last > 0 ? 0 : kInfinite;
+  double low = at_last < 0 ? 0 : -kInfinity, high = at_last > 0 ? 0 : kInfinity;
   for (int k = 0; k < kAcrossSteps && angle != last; ++k) {
     const double here = slope(angle);
     (here < 0 ? low : high) = angle;
@@ -384,7 +384,7 @@ Vec3 least_across(const Body& a, const Body& b, const Vec3& u, const Vec3& d) {
     double next = rate > 0 ? angle - here / rate : angle - std::copysign(kMostAcross, here);
     next = std::clamp(next, angle - kMostAcross, angle + kMostAcross);
     if (!(next > low && next < high)) {
-      if (!(high - low < kInfinite)) break;
+      if (!(high - low < kInfinity)) break;
       next = 0.5 * (low + high);
     }
     last = angle;
@@ -405,7 +405,7 @@ bool line_contact(const Body& a, const Body& b, Vec3 d, double overlap, double r
     return body.frame.scale * feature_lag(*body.shape, on_body, top.h, top.where);
   };
   const FlatFeatures &flats_a = a.shape->flats, &flats_b = b.shape->flats;
-  *room = kInfinite;
+  *room = kInfinity;
   if ((flats_a.edges.empty() && flats_a.ruling.empty()) || (flats_b.edges.empty() && flats_b.ruling.empty()))
     return false;
   *room = lag(a, d, starts ? &starts[0] : nullptr) - reach;
@@ -473,7 +473,7 @@ bool make_pair_polygon(const Particle& pa, const Particle& pb, const Vec3& norma
   const Vec3 towards[2] = {a.turned_back(normal), b.turned_back(-normal)};
   const int nearest[2] = {nearest_face(a.shape->flats, towards[0], kFaceCosine),
                           nearest_face(b.shape->flats, towards[1], kFaceCosine)};
-  double depth[2] = {kInfinite, kInfinite};  // along the normals of the two faces
+  double depth[2] = {kInfinity, kInfinity};  // along the normals of the two faces
   for (int k = 0; k < 2; ++k)
     if (nearest[k] >= 0) depth[k] = contact(k, nearest[k]).depth(most);
   int first = old && old->count > 0 && old->reference == 1 ? 1 : 0;

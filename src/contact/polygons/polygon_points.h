@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <cstdint>
-#include <limits>
 
 #include "body/flat_faces.h"
 #include "body/support.h"
@@ -12,8 +11,6 @@
 #include "contact/proof.h"
 
 namespace nurbs::polygon {
-
-constexpr double kInfinite = std::numeric_limits<double>::infinity();
 
 // Share of the room to a polygon, at most kMostRoom smaller bounding radii, that bodies may go: reach and
 // overlap grow by up to five times the way, heights on inclined faces change by more than it.

@@ -54,7 +54,7 @@ bool stand_on_plane(const Particle& particle, const BodyFrame& frame, const Supp
   if (face && shape.flats.faces[set.face].round) set_ring(shape, 1, set.face, out);
   out->factor = 1;
   store(normal, out->normal);
-  out->room = kInfinite;
+  out->room = kInfinity;
   set_marks(plane_frame(origin), frame, out);
   out->rolling = set.ruled ? 1 : 0;
   return true;
@@ -119,7 +119,7 @@ class RegionClip {
   }
   // Distance of points from the region's border.
   double room(const ConvexPolygon& points) const {
-    double least = kInfinite;
+    double least = kInfinity;
     const std::vector<Vec3>& border = region_.cells->border;
     for (std::size_t k = 0; k + 1 < border.size(); k += 2) {
       const Vec2 a = plane.project(border[k]), way = plane.project(border[k + 1]) - a;
@@ -195,7 +195,7 @@ RegionContact make_region_polygon(const Particle& particle, const PlaneRegion& r
     const bool made = stand_on_plane(particle, body.frame, set, region.origin, region.normal, reach, out);
     return made ? placed(room) : RegionContact::point;
   };
-  if (!region.cells) return whole(kInfinite);
+  if (!region.cells) return whole(kInfinity);
   const RegionClip clip(region, body.radius());
   Candidates points;
   double size = 0;
