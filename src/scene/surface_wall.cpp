@@ -13,6 +13,8 @@ namespace {
 constexpr double kMargin =
     0.2;  // of the bounding radius, between the body's sphere and triangles of no concern
 constexpr double kWeld = 1e-6;  // of the bounding radius: corners of a mesh this close are one
+constexpr double kApart =
+    0.01;  // of that, by which meshes may have moved against each other and be as before
 // What of a body's overlap its flat faces make of a bent mesh's unevenness: below it the mesh is flat to
 // them. Bits of single precision that STL files round corners to would have them stand on points that come
 // and go.
@@ -42,6 +44,18 @@ double distance2(const Triangle& t, const Vec3& x) {
   }
   const double height = n.dot(ap);
   return inside ? height * height / n.squaredNorm() : least;
+}
+
+// Corners in the frame of another triangle: its first corner, its first side, its normal.
+Triangle seen_from(const Triangle& other, const Triangle& t) {
+  const Vec3 along = (other[1] - other[0]).normalized(),
+             normal = along.cross(other[2] - other[0]).normalized(), across = normal.cross(along);
+  Triangle out;
+  for (int k = 0; k < 3; ++k) {
+    const Vec3 x = t[k] - other[0];
+    out[k] = Vec3(along.dot(x), across.dot(x), normal.dot(x));
+  }
+  return out;
 }
 
 // Angular velocity that three moving points have, by least squares of w x e = change of velocity along e.
@@ -234,6 +248,34 @@ void SurfaceWall::gather(const Patch& patch, const std::vector<TriangleArray>& m
     triangles_.push_back(triangle_at(meshes[near_[k].mesh].nodes, near_[k].triangle));
 }
 
+// From the triangles gathered. Corners and planes of several meshes are one only while those keep together.
+void SurfaceWall::build(double weld, Patch* patch) const {
+  patch->mesh.build(triangles_.data(), static_cast<int>(triangles_.size()), weld, patch->flat);
+  patch->poses.clear();
+  if (patch->near.empty() || near_[patch->near.front()].mesh == near_[patch->near.back()].mesh) return;
+  const auto area2 = [&](int k) {
+    const Triangle& t = triangles_[k];
+    return (t[1] - t[0]).cross(t[2] - t[0]).squaredNorm();
+  };
+  for (int k = 0; k < static_cast<int>(triangles_.size()); ++k)
+    if (k == 0 || near_[patch->near[k]].mesh != near_[patch->near[k - 1]].mesh)
+      patch->poses.push_back({k, {}});
+    else if (area2(k) > area2(patch->poses.back().triangle))
+      patch->poses.back().triangle = k;
+  for (Patch::Pose& p : patch->poses)
+    p.seen = seen_from(triangles_[patch->poses.front().triangle], triangles_[p.triangle]);
+}
+
+// Whether the meshes of a patch lie to each other as they did when it was built.
+bool SurfaceWall::keeps_together(double weld, const Patch& patch) const {
+  return std::all_of(patch.poses.begin(), patch.poses.end(), [&](const Patch::Pose& p) {
+    const Triangle now = seen_from(triangles_[patch.poses.front().triangle], triangles_[p.triangle]);
+    for (int k = 0; k < 3; ++k)
+      if (!((now[k] - p.seen[k]).norm() <= kApart * weld)) return false;
+    return true;
+  });
+}
+
 void SurfaceWall::find_in_mesh(int body, const ContactStages::Step& step,
                                const std::vector<TriangleArray>& meshes, const FormerContact* former,
                                int count) {
@@ -258,23 +300,20 @@ void SurfaceWall::find_in_mesh(int body, const ContactStages::Step& step,
     return search();
   }
   const BodyRecord& record = step.bodies->record(body);
-  const auto build = [&](double flat) {
-    patch.flat = flat;
-    patch.mesh.build(triangles_.data(), static_cast<int>(triangles_.size()), kWeld * record.radius, flat);
-  };
+  const double weld = kWeld * record.radius;
   const bool anew = made || path > patch.until;
-  if (anew) {
-    choose(record, body, path, meshes, &patch);
-    gather(patch, meshes);
-    build(made ? kWeld * record.radius : patch.flat);
-  } else if (path_ > 0) {
-    gather(patch, meshes);
+  if (made) patch.flat = weld;
+  if (anew) choose(record, body, path, meshes, &patch);
+  if (anew || path_ > 0) gather(patch, meshes);
+  if (anew || (path_ > 0 && !keeps_together(weld, patch)))
+    build(weld, &patch);
+  else if (path_ > 0)
     patch.mesh.move(triangles_.data());
-  }
   search();
   if (const double flat = flatness(record, *particle.shape, patch); flat != patch.flat) {
     if (!anew && path_ == 0) gather(patch, meshes);  // else they were
-    build(flat);
+    patch.flat = flat;
+    build(weld, &patch);
     search();
   }
   contacts_.expiry = std::min(contacts_.expiry, patch.until);

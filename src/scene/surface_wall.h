@@ -71,11 +71,20 @@ class SurfaceWall {
     std::vector<int> near;  // numbers in near_
     double until = -kFarAway;
     double flat = 0;  // length within which triangles are taken for one plane
+    // The largest triangle of each mesh, and where its corners were, seen from the first mesh's; none of one
+    // mesh only.
+    struct Pose {
+      int triangle;  // number in near
+      Triangle seen;
+    };
+    std::vector<Pose> poses;
   };
   void choose(const BodyRecord& body, int number, double path, const std::vector<TriangleArray>& meshes,
               Patch* patch) const;
   double flatness(const BodyRecord& body, const Shape& shape, const Patch& patch) const;
   void gather(const Patch& patch, const std::vector<TriangleArray>& meshes);
+  void build(double weld, Patch* patch) const;
+  bool keeps_together(double weld, const Patch& patch) const;
   TubeSurvey* survey_of(int body, const Particle& particle);
   std::uint64_t name_of(const SurfaceContact& c, int body, const std::vector<TriangleArray>& meshes) const;
   void motion_at(const SurfaceContact& c, const Vec3& point, int body,

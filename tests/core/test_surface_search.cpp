@@ -257,6 +257,26 @@ TEST(SurfaceSearch, ForceAndEnergyDoNotKnowHowTheMeshIsCut) {
     }
 }
 
+// As where two meshes have a plate in common, each with its own side of it.
+TEST(SurfaceSearch, TrianglesThatAreThereTwiceCountOnce) {
+  Random random(11);
+  for (const auto& shape : bodies())
+    for (int round = 0; round < 20; ++round) {
+      const Scene scene = random_scene(shape, random);
+      const Sum once = search(scene.body, scene.mesh);
+      ASSERT_GT(once.force.norm(), 0);
+      Mesh twice = scene.mesh;
+      for (const Triangle& t : scene.mesh.triangles) {
+        if (random.below(3) > 0) twice.add(t[0], t[2], t[1]);
+        if (random.below(3) > 0) twice.add(t[1], t[2], t[0]);
+      }
+      std::shuffle(twice.triangles.begin(), twice.triangles.end(), random.engine());
+      const Sum other = search(scene.body, twice);
+      EXPECT_NEAR((once.force - other.force).norm(), 0, 1e-7 * once.force.norm()) << shape->name << round;
+      EXPECT_EQ(once.count, other.count);
+    }
+}
+
 // One triangle of a conforming sheet is cut at a side's middle, its neighbour is not.
 TEST(SurfaceSearch, SidesThatDoNotConformAreNoBorders) {
   Mesh mesh, torn;

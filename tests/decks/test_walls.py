@@ -66,6 +66,7 @@ PEBBLES = [(1, 1, 1, 0.03, 2500.0, 0.0, 0.0, 0.05, 0.8, 0.3, -0.5, 0.2),
            (2, 1, 1, 0.03, 2500.0, 0.005, 0.01, 0.13, 1.0, 0.0, 0.0, 0.0)]
 THROWN = [(1, 0.1, 0.05, -0.3, 3.0, -2.0, 5.0), (2, 0.0, 0.0, -0.5, 0.0, 10.0, 0.0)]
 MESH = "fix m all mesh/surface file wall.stl type 1"
+OTHER = "\nfix n all mesh/surface file other.stl type 1"
 
 
 def run(wall, atoms=PEBBLES, velocities=THROWN, mesh=None, body=None, before="", after="", steps="run 8000", ranks=1,
@@ -139,9 +140,35 @@ class Meshes(unittest.TestCase):
     def test_two_meshes_are_one_wall(self):
         floor = sheet(6, 0.18)
         one = run("mesh m", mesh=floor, before=MESH)
-        two = run("mesh m n", before=MESH + "\nfix n all mesh/surface file other.stl type 1", mesh=floor[::2],
-                  files={"other.stl": stl(floor[1::2])})
+        two = run("mesh m n", before=MESH + OTHER, mesh=floor[::2], files={"other.stl": stl(floor[1::2])})
         np.testing.assert_allclose(frames(two), frames(one), rtol=0, atol=1e-9)
+
+    def test_meshes_may_share_triangles(self):
+        """Either side of a plate that two parts have in common is in both their files."""
+        floor = sheet(6, 0.18)
+        one = run("mesh m", mesh=floor, before=MESH)
+        for common in (floor, [(a, c, b) for a, b, c in floor[::2]]):
+            two = run("mesh m n", before=MESH + OTHER, mesh=floor, files={"other.stl": stl(common)})
+            np.testing.assert_allclose(frames(two), frames(one), rtol=0, atol=1e-12)
+
+    def test_meshes_part_and_keep_together(self):
+        """A plate that lay in the floor lifts a pebble from it; halves of a drum that turn alike are a drum."""
+        pebble = [(1, 1, 1, 0.05, 2500.0, 0.0, 0.0, 0.04, 1.0, 0.0, 0.0, 0.0)]
+        lift = "\nfix mv all move/mesh mesh n linear 0 0 0.05"
+        options = dict(atoms=pebble, velocities=(), gravity=None, steps="run 6000", files={"other.stl": stl(sheet(2, 0.04))})
+        alone = frames(run("mesh n", before=OTHER + lift, **options))
+        self.assertGreater(alone[-1, 0, 2], 0.043)
+        for floor in (sheet(1, 0.18), sheet(9, 0.18)):
+            off = frames(run("mesh m n", before=MESH + OTHER + lift, mesh=floor, **options))
+            np.testing.assert_allclose(off, alone, rtol=0, atol=1e-5)
+        drum = tube(60, 0.14, 0.19)
+        turn = "\nfix mv_{0} all move/mesh mesh {0} rotate origin 0. 0. 0. axis 0. 1. 0. period {1}"
+        options = dict(atoms=[PEBBLES[0][:7] + (-0.1,) + PEBBLES[0][8:]], velocities=(), box=((-0.2, 0.2),) * 3, steps="run 10000")
+        whole = frames(run("mesh m", mesh=drum, before=MESH + turn.format("m", 1), **options))
+        options.update(mesh=drum[::2], files={"other.stl": stl(drum[1::2])})
+        for period, near in ((1, 1e-12), (1 + 1e-7, 1e-4)):
+            halves = run("mesh m n", before=MESH + OTHER + turn.format("m", 1) + turn.format("n", period), **options)
+            np.testing.assert_allclose(frames(halves), whole, rtol=0, atol=near)
 
     def test_boxes_stand_on_them(self):
         box = [(1, 1, 1, 0.05, 2500.0, 0.0, 0.01, 0.0451, 1.0, 0.0, 0.0, 0.0)]

@@ -80,10 +80,17 @@ void MeshPatch::weld(const Triangle* triangles, int count, double distance) {
       vertices_.push_back({triangle[k], t, k, 0, 0, 0, 0, false});
       by_x.insert(std::lower_bound(by_x.begin(), by_x.end(), std::make_pair(x, at[k])), {x, at[k]});
     }
-    if (at[0] == at[1] || at[1] == at[2] || at[2] == at[0]) continue;
+    if (at[0] == at[1] || at[1] == at[2] || at[2] == at[0] || has_cell(at)) continue;
     cells_.push_back({t, -1, static_cast<int>(corners_.size()), 3});
     corners_.insert(corners_.end(), at, at + 3);
   }
+}
+
+// Whether there is a triangle of three vertices; cells are triangles still.
+bool MeshPatch::has_cell(const int (&at)[3]) const {
+  return std::any_of(cells_.begin(), cells_.end(), [&](const Cell& cell) {
+    return std::is_permutation(at, at + 3, corners_.begin() + cell.first);
+  });
 }
 
 // Splits the sides without a partner where another such side's corner lies on them.

@@ -54,8 +54,8 @@ class MeshPatch {
   };
 
   // From triangles in an order that does not depend on ranks; corners closer than `weld` (length) are one.
-  // Triangles without area are left out. Triangles within `flat` (length) of a larger one's plane lie in it.
-  // O(n^2) in the number of triangles.
+  // Triangles without area are left out, and those with the corners of an earlier one. Triangles within
+  // `flat` (length) of a larger one's plane lie in it. O(n^2) in the number of triangles.
   void build(const Triangle* triangles, int count, double weld, double flat = 0);
   // A single plane without bounds.
   void build_plane(const Vec3& origin, const Vec3& normal);
@@ -87,6 +87,7 @@ class MeshPatch {
     int low, high, cell, slot;
   };
   void weld(const Triangle* triangles, int count, double distance);
+  bool has_cell(const int (&at)[3]) const;
   void split_sides(double distance);
   void find_planes(const Triangle* triangles, double distance);
   void find_edges();
