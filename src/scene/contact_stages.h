@@ -335,6 +335,7 @@ class ContactStages {
   LeftPolygon leave_flat(ContactBlock& block, int lane, FlatContact& flat, const PolygonState& state,
                          double overlap);
   void settle_left(ContactBlock& block, int lane, Results& results, const LeftPolygon& left);
+  double arrived(double more, int a, int b, const Vec3& normal, const Vec3& arm_a, const Vec3& arm_b) const;
   void relax_factor(const ContactBlock& block, int lane, FlatContact& flat, const PolygonState& state);
   void relax_weight(ContactBlock& block, int lane, double gap);
   void book(double energy, int a, int b);

@@ -272,6 +272,16 @@ void ContactStages::relax_factor(const ContactBlock& block, int lane, FlatContac
   book(-energy, block.a[lane], block.b[lane]);
 }
 
+// Of what contacts hold more than those whose place they take (U / kn), what came to the surface in this
+// step: that no spring has held before, and it is none's share.
+double ContactStages::arrived(double more, int a, int b, const Vec3& normal, const Vec3& arm_a,
+                              const Vec3& arm_b) const {
+  const BodyRecord &ra = record(a), &rb = record(b);
+  const Vec3 velocity = velocity_at(ra, rb, load(ra.spin), load(rb.spin), arm_a, arm_b);
+  const double way = kArrival * step_.dt * std::max(0.0, -normal.dot(velocity));
+  return std::clamp(0.5 * way * way, 0.0, std::max(0.0, more));
+}
+
 // The polygon anew, after the points slid or the body tilted; histories go to the new points.
 bool ContactStages::remake(ContactBlock& block, int lane, FlatContact& flat, PolygonState& state,
                            double overlap) {
@@ -285,8 +295,11 @@ bool ContactStages::remake(ContactBlock& block, int lane, FlatContact& flat, Pol
   const double held = rolled_along(flat.polygon, polygon) ? energy_after_rolling(flat.polygon, polygon, fresh)
                                                           : stored_energy(flat.polygon, state);
   const double holds = stored_energy(polygon, fresh);
+  const int deepest = static_cast<int>(std::min_element(fresh.gap, fresh.gap + fresh.count) - fresh.gap);
+  const double kept =
+      held + arrived(holds - held, a, b, state.normal, fresh.arm_a[deepest], fresh.arm_b[deepest]);
   if (holds > 0)
-    polygon.factor = std::min(polygon.factor * held / holds, std::max(kStiffest, polygon.factor));
+    polygon.factor = std::min(polygon.factor * kept / holds, std::max(kStiffest, polygon.factor));
   int source[kContactPoints];
   match(flat.polygon, state, polygon, fresh, source);
   if (step_.model != nullptr) {
@@ -297,7 +310,7 @@ bool ContactStages::remake(ContactBlock& block, int lane, FlatContact& flat, Pol
 
   const ContactCoefficients& all = step_.laws[block.law[lane]];
   const BodyMotion motion_a = motion_of(record(a)), motion_b = motion_of(record(b));
-  double energy = all.kn * (held - stored_energy(polygon, fresh));
+  double energy = all.kn * (kept - stored_energy(polygon, fresh));
   ContactState old[kBlock];
   for (int k = 0; k < kBlock; ++k) {
     flat.points.get(k, kStateField, kContactStateSize, &old[k]);
@@ -381,13 +394,15 @@ void ContactStages::settle_left(ContactBlock& block, int lane, Results& results,
   const double kn = step_.model != nullptr ? 1 : step_.laws[block.law[lane]].kn;
   const bool touching = results.touching[lane] != 0;
   const double full = 0.5 * kn * results.gap[lane] * results.gap[lane];
+  double held = left.normal_energy;
+  if (touching && held > 0) {
+    const ContactGeometry g = results.geometry(lane);
+    held += kn * arrived((full - held) / kn, a, b, g.normal, g.arm_a, g.arm_b);
+  }
   double& weight = block.field[kWeight][lane];
-  weight = !touching                ? 1
-           : left.normal_energy > 0 ? std::min(left.normal_energy / full, kStiffest)
-           : a < -1                 ? kSoftest
-                                    : 1;
+  weight = !touching ? 1 : held > 0 ? std::min(held / full, kStiffest) : a < -1 ? kSoftest : 1;
   if (step_.model != nullptr) return;
-  double energy = left.normal_energy + left.tangential_energy;
+  double energy = held + left.tangential_energy;
   ContactState single{};
   if (touching) {
     const ContactCoefficients own = scaled(step_.laws[block.law[lane]], weight);

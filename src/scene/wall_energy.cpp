@@ -22,7 +22,6 @@ namespace {
 
 constexpr double kSamePlane = 1e-9;  // of normals, and of the bounding radius: two planes are one
 constexpr double kSameWay = 0.01;    // of a wall's way in a step by which its plane may be elsewhere
-constexpr double kArrival = 1.1;     // ways of a step that a contact which begins at its surface is deep
 constexpr std::uint64_t kPiece = 7;  // bits of a name that say plane, edge or vertex; planes are 0
 
 }  // namespace

@@ -18,6 +18,7 @@ constexpr double kRelaxation = 0.1;
 // small against both, whatever the time step. One that turns back in a bounce has the acceleration.
 constexpr double kResting = 0.02;
 constexpr double kLasting = 12;    // rad of a contact's oscillation: a bounce, which has pi, is over by then
+constexpr double kArrival = 1.1;   // ways of a step that a contact which begins at its surface is deep
 constexpr double kStiffest = 8;    // factor or weight of a contact; four is what a corner needs
 constexpr double kSoftest = 1e-3;  // weight of one whose polygon held nothing over its part of a mesh's
                                    // plane, beside which the body's deepest point may lie

@@ -16,7 +16,8 @@ namespace nurbs {
 namespace {
 
 constexpr double kFlat = 1e-9;          // of the extent: points this near a plane have no hull
-constexpr double kGjkTolerance = 1e-9;  // of the extent
+constexpr double kGjkTolerance = 1e-9;  // of the extent ...
+constexpr double kGjkShare = 1e-4;      // ... or of the distance
 constexpr int kGjkIterations = 100;
 constexpr size_t kManyVertices = 300;  // from here on a table of starts pays: a climb crosses half the hull
 
@@ -78,13 +79,13 @@ std::vector<std::array<int, 3>> hull_triangles(const std::vector<Vec3>& points) 
 
 }  // namespace
 
-// Nearest point to the origin of the simplex with `count` corners y, and which corners it needs (weights >
-// 0): over all faces, the nearest point of the face's plane if it lies in the face.
+// Which corners the nearest point needs (weights > 0): over all faces that have the last corner, the nearest
+// point of the face's plane if it lies in the face.
 Vec3 nearest_on_simplex(Vec3 (&y)[4], int& count) {
   double best = 1e300;
   Vec3 nearest = y[0];
   int best_mask = 1;
-  for (int mask = 1; mask < 1 << count; ++mask) {
+  for (int mask = 1 << (count - 1); mask < 1 << count; ++mask) {
     int at[4], n = 0;
     for (int k = 0; k < count; ++k)
       if (mask >> k & 1) at[n++] = k;
@@ -205,7 +206,8 @@ Vec3 ConvexHull::way(const Vec3& x, double enough, int& start) const {
       return far <= kGjkTolerance * extent_ ? Vec3(Vec3::Zero()) : nearest;
     start = support(-nearest, start);
     const Vec3 y = mesh_.points[start] - x;
-    if (far * far - nearest.dot(y) <= kGjkTolerance * extent_ * far) return nearest;
+    if (far * far - nearest.dot(y) <= std::max(kGjkTolerance * extent_, kGjkShare * far) * far)
+      return nearest;
     for (int i = 0; i < count; ++i)
       if (simplex[i] == y) return nearest;
     simplex[count++] = y;

@@ -165,9 +165,8 @@ struct HullPiece {
   bool operator<(const HullPiece& other) const { return bound < other.bound; }
 };
 
-// Largest distance of the control points to the hull.
-double control_distance(const BezierPatch& patch, const ConvexHull& hull, int& vertex) {
-  double most = 0;
+// Largest distance of the control points to the hull, or `most` if that is more.
+double control_distance(const BezierPatch& patch, const ConvexHull& hull, double most, int& vertex) {
   for (const Vec4& p : patch.points) most = std::max(most, hull.distance(p.head<3>() / p[3], most, vertex));
   return most;
 }
@@ -183,9 +182,8 @@ double outward_distance(const Shape& shape, const ConvexHull& hull, double resol
   double found = 0;
   int vertex = 0;
   const auto add = [&](const BezierPatch& patch) {
-    pieces.push({patch, control_distance(patch, hull, vertex), vertex});
-    const Vec3 middle = evaluate0(patch, 0.5, 0.5);
-    found = std::max(found, hull.distance(middle, found, vertex));
+    found = std::max(found, hull.distance(evaluate0(patch, 0.5, 0.5), found, vertex));
+    pieces.push({patch, control_distance(patch, hull, found, vertex), vertex});
   };
   for (const BezierPatch& patch : shape.patches) {
     BezierPatch moved = patch;

@@ -252,7 +252,7 @@ void simplify(const FitArguments& a) {
   try {
     const ConvexHull hull(sample(*shape));
     const double radius = shape->bounding_radius;
-    sag = hull_distance(*shape, hull, 1e-5 * radius).outward / radius;
+    sag = hull_distance(*shape, hull, 0.01 * tolerance * radius).outward / radius;
     if (sag > 0.5 * tolerance)
       throw ShapeError("the tolerance of " + format("%.3g", 100 * tolerance) +
                        " % is finer than the body is sampled, " + format("%.2g", 200 * sag) + " % at least");
