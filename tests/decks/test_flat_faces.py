@@ -246,6 +246,32 @@ run 12000
 """
 
 
+class Landing(unittest.TestCase):
+    def test_boxes_are_as_stiff_however_they_come_down(self):
+        """A face that comes down in a step on an edge that hardly bears: once it was as soft as what that had held over
+        what the face would hold, to a thousandth, until the box was at rest or through the floor."""
+        random = np.random.default_rng(3)
+        turns = random.normal(size=(81, 4))
+        turns /= np.linalg.norm(turns, axis=1)[:, None]
+        heights, spins = random.uniform(0.25, 0.4, 81), random.uniform(-2, 2, (81, 3))
+        sheet = meshes.ascii_stl(np.array([(x, y, 0) for y in (-3, 0, 3) for x in (-3, 0, 3)], float), np.array(
+            [(i, j, k) for a in (0, 1, 3, 4) for i, j, k in ((a, a + 1, a + 4), (a, a + 4, a + 3))]))
+        block = (82, 1, 1, 5.5, 1e12, 0.0, 0.0, 2.15, 1.0, 0.0, 0.0, 0.0)  # too heavy to be turned
+        for floor in ("plane", "mesh", "block"):
+            last, level = ([block], 2.15 + 5.5 * HALF[2]) if floor == "block" else ([], 0)
+            for dt in (2e-4, 1e-4):
+                boxes = [atom(k + 1, (0.45 * (k // 9 - 4), 0.45 * (k % 9 - 4), level + heights[k]), turns[k], 0.3)
+                         for k in range(81)]
+                out = run(boxes + last, round(0.6 / dt), [(k + 1, 0, 0, -1, *map(float, spins[k])) for k in range(81)] +
+                          [(82, 0, 0, 0, 0, 0, 0) for _ in last], law=LAW.replace("cn 8e4 ct 4e4", "cn 8e3 ct 4e3"), dt=dt, every=10,
+                          mesh=sheet if floor == "mesh" else None, before="group block id 82",
+                          gravity="0 0 -1\nfix hold block setforce 0.0 0.0 0.0")
+                z = np.array([columns["z"][:81] for _, columns in out.dump("out.dump")])
+                lowest = (z.min() - level) / (0.3 * HALF[2])
+                print(f"    boxes on a {floor}, dt {dt}: centre down to {lowest:.3f} of the least half edge", flush=True)
+                self.assertGreater(lowest, 0.95)
+
+
 class Images(unittest.TestCase):
     def test_a_body_that_touches_its_own_images(self):
         """Both halves of such a contact are the same contact, and it is still that of its image, not of another, when the

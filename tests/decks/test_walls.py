@@ -151,6 +151,18 @@ class Meshes(unittest.TestCase):
             two = run("mesh m n", before=MESH + OTHER, mesh=floor, files={"other.stl": stl(common)})
             np.testing.assert_allclose(frames(two), frames(one), rtol=0, atol=1e-12)
 
+    def test_plates_overlap_in_nearly_one_plane(self):
+        """As single precision leaves them: nothing touches the border of one where it lies in the other."""
+        left, right = sheet(3, 0.1, y_size=0.18), sheet(2, 0.095, y_size=0.15)
+        ball = [(1, 1, 1, 0.02, 2500.0, -0.1, 0.003, 0.0195, 1.0, 0.0, 0.0, 0.0)]
+        for off in (1e-10, 1e-9, 1e-8):
+            plates = [[tuple((x + way, y + 0.1 * way, z - low) for x, y, z in t) for t in plate]
+                      for plate, way, low in ((left, -0.08, 0), (right, 0.085, off))]
+            rolls = run("mesh m n", ball, [(1, 1, 0, 0, 0, 0, 0)], before=MESH + OTHER, mesh=plates[0], body=shape("sphere", 1),
+                        files={"other.stl": stl(plates[1])}, law="kn 1e4 kt 5e3 mu 0", steps="run 20000")
+            self.assertGreater(frames(rolls)[-1, 0, 0], 0.09)
+            self.assertLess(np.ptp(rolls.thermo["ledger"]), 1e-6 * rolls.thermo["ledger"][0])
+
     def test_meshes_part_and_keep_together(self):
         """A plate that lay in the floor lifts a pebble from it; halves of a drum that turn alike are a drum."""
         pebble = [(1, 1, 1, 0.05, 2500.0, 0.0, 0.0, 0.04, 1.0, 0.0, 0.0, 0.0)]

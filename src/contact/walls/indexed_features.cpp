@@ -119,14 +119,20 @@ void SurfaceSearch::touch_edge(int number) {
 // there.
 bool SurfaceSearch::covered(const FeatureContact& f, const std::vector<Stretch>& line) const {
   const Vec3 y = particle_.x + f.on_body - f.gap * f.normal;
+  const auto cell_at = [&](const Stretch& piece) {
+    return patch_.side(patch_.edges()[piece.edge].first_side).cell;
+  };
+  const auto of_line = [&](int c) {
+    return std::any_of(line.begin(), line.end(), [&](const Stretch& piece) { return cell_at(piece) == c; });
+  };
   for (std::size_t c = 0; c < patch_.cells().size(); ++c) {
     const MeshPatch::Cell& cell = patch_.cells()[c];
-    const bool own = std::any_of(line.begin(), line.end(), [&](const Stretch& piece) {
-      return patch_.side(patch_.edges()[piece.edge].first_side).cell == static_cast<int>(c);
-    });
-    if (own || !planes_[cell.plane].active) continue;
+    if (!planes_[cell.plane].active || of_line(static_cast<int>(c))) continue;
+    // What is one plane to the patch may be off it by more.
     const MeshPatch::Plane& plane = patch_.planes()[cell.plane];
-    if (std::abs(plane.normal.dot(y - plane.origin)) > kWithin * radius_) continue;
+    if (cell.plane != patch_.cells()[cell_at(line.front())].plane &&
+        std::abs(plane.normal.dot(y - plane.origin)) > kWithin * radius_)
+      continue;
     if (in_cell(cell, y)) return true;
   }
   return false;
