@@ -136,6 +136,8 @@ bool ContactStages::stay(int body, std::int32_t head) {
   const ContactBlock& block = pool_.block(head);
   const int lane = ContactPool::lane(head);
   if (!p.follows || p.next != 0 || block.field[kStateField][lane] == 0) return false;
+  // A run may begin with the velocity of a wall that has been stopped.
+  if (!load(p.record.velocity).isZero(0) || !load(p.record.spin).isZero(0)) return false;
   store(load(step_.bodies->record(body).x), p.body);
   return true;
 }

@@ -430,6 +430,27 @@ class MovingWalls(unittest.TestCase):
         # It slides first: mu g is its acceleration.
         self.assertAlmostEqual(velocity[7, 0], 0.4 * 9.81 * 500e-5 * 7, delta=0.01)
 
+    def test_the_belt_under_a_body_drags_it(self):
+        """Not the plate flush with it, however large its triangles are, nor the belt one on the plate."""
+        belt = MESH + " surface_vel 0.3 0. 0."
+        for place, velocity in ((-0.05, 0.4 * 9.81 * 0.01), (0.05, 0)):
+            box = [(1, 1, 1, 0.04, 2500.0, place, 0.003, 0.04 * 0.8 - 1e-5, 1.0, 0.0, 0.0, 0.0)]
+            for cut, plate in ((1, 1), (1, 8), (8, 1)):
+                side = lambda n, way: [tuple((x + way, y, z) for x, y, z in t) for t in sheet(n, 0.095, y_size=0.15)]  # noqa: E731
+                out = run("mesh m n", box, (), before=belt + OTHER, mesh=side(cut, -0.095), files={"other.stl": stl(side(plate, 0.095))},
+                          body=deck.box_shape(1, 1, 0.8), law="kn 1e5 kt 5e4 cn 100 ct 50 mu 0.4", steps="run 1000")
+                self.assertAlmostEqual(frames(out)[-1, 0, 3], velocity, delta=0.25 * velocity + 1e-9)
+
+    def test_a_restart_after_the_mesh_was_stopped(self):
+        motion = MESH + "\nfix mv all move/mesh mesh m linear 0.1 0. 0."
+        options = dict(law="kn 1e5 kt 5e4 cn 100 ct 50 mu 0.4", body=shape("sphere", 1))
+        ball = [(1, 1, 1, 0.03, 2500.0, -0.1, 0.0, 0.02999, 1.0, 0.0, 0.0, 0.0)]
+        moved = "run 2000\nunfix mv\nwrite_restart half.rst\n"
+        whole = run("mesh m", ball, (), mesh=sheet(3, 0.15), before=motion, steps=moved + "run 1000", **options)
+        rest = run("mesh m", mesh=sheet(3, 0.15), before=MESH, steps="run 1000", files={"half.rst": whole.path / "half.rst"},
+                   start="newton off\ncommunicate single vel yes\nread_restart half.rst\n", **options)
+        np.testing.assert_allclose(last(rest), last(whole), rtol=0, atol=1e-12)
+
     def test_drum_of_triangles_and_round_drum(self):
         ball = [(1, 1, 1, 0.03, 2500.0, 0.03, 0.0, -0.105, 0.9, 0.3, 0.1, 0.2)]
         turn = "rotate origin 0 0 0 axis 0 1 0 period 0.5"

@@ -103,6 +103,7 @@ class SurfaceSearch {
   double inside(const ActivePlane& met, const MeshPatch::Plane& plane, const MeshPatch::Edge& e) const;
   bool holds(int number, const ActivePlane& met) const;
   int cell_below(int number);
+  int triangle_under(int number, const Vec3& deepest);
   int cell_with(int number, const Vec3& x) const;
   Vec3 crossing(int number, const Vec3& deepest, double gap) const;
   bool in_cell(const MeshPatch::Cell& cell, const Vec3& x) const;

@@ -143,8 +143,7 @@ bool SurfaceSearch::stand_on(int number) {
   bool stands = met.stands;
   for (int k = 0; k < former_count_ && !stands; ++k)
     stands = former_[k].flat && former_[k].normal.dot(met.normal) > kSamePlane;
-  const bool unbounded = patch_.unbounded(), over = met.stands || unbounded || cell_below(number) >= 0;
-  const int triangle = unbounded ? 0 : patch_.planes()[number].leader;
+  const bool over = met.stands || patch_.unbounded() || cell_below(number) >= 0;
   if (!stands) {
     // Where several planes of about one slope are met, the surface is bent under the body, and its features
     // stand on points.
@@ -166,10 +165,33 @@ bool SurfaceSearch::stand_on(int number) {
     }
     if (!over) {  // the plane's deepest point is beside the wall; the polygon's is on it
       if (!polygon_over(region, -reach * gap, &gap, &on_body)) return false;
-      return add_plane(number, triangle, true, gap, on_body);
+      return add_plane(number, triangle_under(number, on_body), true, gap, on_body);
     }
   }
-  return add_plane(number, triangle, true, met.result.gap, met.deepest);
+  return add_plane(number, triangle_under(number, met.deepest), true, met.result.gap, met.deepest);
+}
+
+// Of a plane, that under the middle of the polygon that stood on it, or else under the deepest point: what
+// moves, or is told of the force.
+int SurfaceSearch::triangle_under(int number, const Vec3& deepest) {
+  if (patch_.unbounded()) return 0;
+  MeshPatch::Plane& plane = patch_.planes()[number];
+  Vec3 middle = deepest;
+  for (int k = 0; k < former_count_; ++k) {
+    const FormerContact& f = former_[k];
+    if (!f.polygon || !(f.normal.dot(planes_[number].normal) > kSamePlane)) continue;
+    middle.setZero();
+    for (int i = 0; i < f.polygon->count; ++i) middle += load(f.polygon->point[i]) / f.polygon->count;
+    middle = particle_.scale * (particle_.q * middle);
+  }
+  for (const Vec3& x : {middle, deepest}) {
+    const Vec3 at = particle_.x + x;
+    const int cell = in_cell(patch_.cells()[plane.hint], at) ? plane.hint : cell_with(number, at);
+    if (cell < 0) continue;
+    plane.hint = cell;
+    return patch_.cells()[cell].triangle;
+  }
+  return plane.leader;
 }
 
 bool SurfaceSearch::stood_on(const Vec3& normal) const {
