@@ -16,8 +16,7 @@ namespace nurbs {
 namespace {
 
 constexpr double kFlat = 1e-9;          // of the extent: points this near a plane have no hull
-constexpr double kGjkTolerance = 1e-9;  // of the extent ...
-constexpr double kGjkShare = 1e-4;      // ... or of the distance
+constexpr double kGjkTolerance = 1e-9;  // of the extent
 constexpr int kGjkIterations = 100;
 constexpr size_t kManyVertices = 300;  // from here on a table of starts pays: a climb crosses half the hull
 
@@ -206,8 +205,7 @@ Vec3 ConvexHull::way(const Vec3& x, double enough, int& start) const {
       return far <= kGjkTolerance * extent_ ? Vec3(Vec3::Zero()) : nearest;
     start = support(-nearest, start);
     const Vec3 y = mesh_.points[start] - x;
-    if (far * far - nearest.dot(y) <= std::max(kGjkTolerance * extent_, kGjkShare * far) * far)
-      return nearest;
+    if (far * far - nearest.dot(y) <= kGjkTolerance * extent_ * far) return nearest;
     for (int i = 0; i < count; ++i)
       if (simplex[i] == y) return nearest;
     simplex[count++] = y;

@@ -35,8 +35,8 @@ class ConvexHull {
   int support(const Vec3& d, int start) const;
 
   // Upper bound of the distance from x to the hull, 0 inside: that to a point of it, found by Gilbert's,
-  // Johnson's and Keerthi's algorithm to 1e-9 of the extent or 1e-4 of itself; the search ends early at
-  // `enough`. `start` as above, and left at a vertex near x.
+  // Johnson's and Keerthi's algorithm to 1e-9 of the extent; the search ends early at `enough`. `start` as
+  // above, and left at a vertex near x.
   double distance(const Vec3& x, double enough, int& start) const { return way(x, enough, start).norm(); }
 
   // From x to the point of the hull that this is the distance to; zero inside.
