@@ -34,6 +34,8 @@
 //             holds for the way `still_holds`. Where all points
 //             of a face are closed it can't be: beside a face the body falls away.
 //     A remake takes kKeptReach. One that yields count = 0 hands back to a single point, its factor likewise.
+//     What came to the surface within the step, as a face does whose other edge comes down, nothing has held
+//     before: taken up in the factor too, it would leave a contact as soft as the old one was shallow.
 //  4. match() tells from which old point every new one inherits its history. A spring xi_i is a displacement,
 //     its force w_i kt xi_i: copying it keeps the sum under a plain slide, whatever the weights.
 //
