@@ -395,14 +395,13 @@ void ContactStages::settle_left(ContactBlock& block, int lane, Results& results,
   const bool touching = results.touching[lane] != 0;
   const double full = 0.5 * kn * results.gap[lane] * results.gap[lane];
   double held = left.normal_energy;
-  if (touching && (held > 0 || a < -1)) {
+  const bool takes_over = touching && (held > 0 || a < -1);
+  if (takes_over) {
     const ContactGeometry g = results.geometry(lane);
     held += kn * arrived((full - held) / kn, a, b, g.normal, g.arm_a, g.arm_b);
   }
   double& weight = block.field[kWeight][lane];
-  weight = !touching                  ? 1
-           : !(held > 0) && !(a < -1) ? 1
-                                      : std::clamp(held / full, a < -1 ? kSoftest : 0, kStiffest);
+  weight = takes_over ? std::clamp(held / full, a < -1 ? kSoftest : 0, kStiffest) : 1;
   if (step_.model != nullptr) return;
   double energy = held + left.tangential_energy;
   ContactState single{};

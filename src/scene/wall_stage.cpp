@@ -171,10 +171,8 @@ int ContactStages::list_former(int body, std::int32_t head, Former* former) {
       const ContactPolygon& polygon = flat->polygon;
       f.flat = true;
       f.normal = load(polygon.normal);
-      Vec3 middle = Vec3::Zero();
-      for (int k = 0; k < polygon.count; ++k) middle += load(polygon.point[k]) / polygon.count;
       const Particle particle = step_.bodies->particle(body);
-      f.point = particle.x + particle.scale * (particle.q * middle);
+      f.point = particle.x + particle.scale * (particle.q * middle_of(polygon));
     }
   }
   return count;

@@ -48,6 +48,12 @@ BodyFrame plane_frame(const Vec3& origin) {
   return {1, origin, Mat3::Identity(), nullptr};
 }
 
+Vec3 middle_of(const ContactPolygon& polygon) {
+  Vec3 middle = Vec3::Zero();
+  for (int k = 0; k < polygon.count; ++k) middle += load(polygon.point[k]) / polygon.count;
+  return middle;
+}
+
 PolygonState evaluate(const ContactPolygon& polygon, const BodyFrame& a, const BodyFrame& b) {
   PolygonState state;
   state.count = polygon.count;

@@ -87,6 +87,9 @@ struct ContactPolygon {
 };
 static_assert(std::is_trivially_copyable_v<ContactPolygon> && sizeof(ContactPolygon) == 408);
 
+// Mean of the points, incident shape axes, scale 1.
+Vec3 middle_of(const ContactPolygon& polygon);
+
 // A placed body as evaluation needs it; a plane is one with scale 1 and the lab's axes at its origin.
 struct BodyFrame {
   double scale = 1;

@@ -125,14 +125,13 @@ bool SurfaceSearch::covered(const FeatureContact& f, const std::vector<Stretch>&
   const auto of_line = [&](int c) {
     return std::any_of(line.begin(), line.end(), [&](const Stretch& piece) { return cell_at(piece) == c; });
   };
+  const int own = patch_.cells()[cell_at(line.front())].plane;
   for (std::size_t c = 0; c < patch_.cells().size(); ++c) {
     const MeshPatch::Cell& cell = patch_.cells()[c];
     if (!planes_[cell.plane].active || of_line(static_cast<int>(c))) continue;
     // What is one plane to the patch may be off it by more.
     const MeshPatch::Plane& plane = patch_.planes()[cell.plane];
-    if (cell.plane != patch_.cells()[cell_at(line.front())].plane &&
-        std::abs(plane.normal.dot(y - plane.origin)) > kWithin * radius_)
-      continue;
+    if (cell.plane != own && std::abs(plane.normal.dot(y - plane.origin)) > kWithin * radius_) continue;
     if (in_cell(cell, y)) return true;
   }
   return false;

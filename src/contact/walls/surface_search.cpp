@@ -180,9 +180,7 @@ int SurfaceSearch::triangle_under(int number, const Vec3& deepest) {
   for (int k = 0; k < former_count_; ++k) {
     const FormerContact& f = former_[k];
     if (!f.polygon || !(f.normal.dot(planes_[number].normal) > kSamePlane)) continue;
-    middle.setZero();
-    for (int i = 0; i < f.polygon->count; ++i) middle += load(f.polygon->point[i]) / f.polygon->count;
-    middle = particle_.scale * (particle_.q * middle);
+    middle = particle_.scale * (particle_.q * middle_of(*f.polygon));
   }
   for (const Vec3& x : {middle, deepest}) {
     const Vec3 at = particle_.x + x;
