@@ -17,6 +17,7 @@ constexpr double kLeafCells = 0.5;       // that a leaf's normals may cover
 constexpr double kLeafSpread = 0.98;     // least over largest radius of a leaf ...
 constexpr double kNearlyStraight = 1e3;  // ... unless it bends by less than this over the body's size
 constexpr double kSamePlace = 1e-12;     // of the body's size
+constexpr double kArcSpread = 1 - 1e-9;  // least over largest radius of a circle's arc
 constexpr double kBesideCell = 1e-9;     // cells: round-off of a normal's place
 constexpr double kWidestReach = 0.5;     // rad
 
@@ -82,6 +83,7 @@ class RadiiPainter {
     const Bernstein<Vec2>& n = turn.velocity;
     add_end(at(0), end_of(n.begin(), n.end()));
     add_end(at(piece.degree), end_of(n.rbegin(), n.rend()));
+    if (paint_arc(turn)) return true;
     return examine({std::move(turn.velocity), std::move(turn.det), std::move(turn.weight)}, kMostDepth);
   }
 
@@ -149,6 +151,35 @@ class RadiiPainter {
   void put(double from, double to, double radius) {
     const Cells cells = cells_of(from, to);
     for (int k = cells.first; k <= cells.last; ++k) cell_[k] = std::min(cell_[k], radius);
+  }
+
+  // All of a piece that is an arc of a circle at once. With |N|^2 >= m w^2, from coefficients of one degree,
+  // and |det| <= b the radius |N|^3 / (w^3 |det|) is no less than m^(3/2) / b.
+  bool paint_arc(const ProfileTurn& turn) {
+    const Bernstein<Vec2>& n = turn.velocity;
+    const auto dot = [](const Vec2& a, const Vec2& b) -> double { return a.dot(b); };
+    const Bernstein<double> speed2 = multiply(n, n, dot);
+    Bernstein<double> w2 = multiply(turn.weight, turn.weight);
+    if (w2.size() < speed2.size()) w2 = multiply(w2, Bernstein<double>(speed2.size() - w2.size() + 1, 1.0));
+    if (w2.size() != speed2.size()) return false;
+    double least = kFarAway, most = 0;  // of the squared speed over w^2
+    const double noise = 4 * noise_n_ * longest(n);
+    for (std::size_t i = 0; i < w2.size(); ++i) {
+      if (!(w2[i] > 0)) return false;
+      least = std::min(least, (speed2[i] - noise) / w2[i]);
+      most = std::max(most, (speed2[i] + noise) / w2[i]);
+    }
+    const auto [low, high] = std::minmax_element(turn.det.begin(), turn.det.end());
+    const double bend = largest(turn.det) + noise_det_, least_bend = std::max(*low, -*high) - noise_det_;
+    if (!(least > 0 && least_bend > 0)) return false;
+    const double radius = least * std::sqrt(least) / bend;
+    if (!(radius >= kArcSpread * most * std::sqrt(most) / least_bend)) return false;
+    // It turns one way; by less than half a circle if no velocity is against their sum.
+    const Vec2 sum = middle_of(n);
+    for (const Vec2& x : n)
+      if (!(x.dot(sum) > noise_n_ * sum.norm())) return false;
+    put(place_of(square_to(n.front(), side_)), place_of(square_to(n.back(), side_)), radius);
+    return true;
   }
 
   bool examine(ProfileLeaf leaf, int depth) {

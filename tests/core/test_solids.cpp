@@ -398,6 +398,15 @@ TEST(SavedCases, cones_tip_to_tip_on_nearly_one_axis) {
   expect_resolved({{"cone-tips-nearly-in-line.json", -1.178e-6}});
 }
 
+// Left unresolved: minima so soft along a valley that cells of it were known too little. How fast a circle's
+// bend changes was known five times too large; a valley between two circles, about a cone with round edges,
+// was known by one of them; arcs were known by their radius less up to 2 %.
+TEST(SavedCases, soft_valleys_of_bodies_of_revolution) {
+  expect_resolved({{"lenses-in-a-soft-valley.json", -0.0776435840866},
+                   {"segment-about-rounded-cone.json", -0.821686712874},
+                   {"capsule-along-segment.json", -1.01184429476}});
+}
+
 // Left unresolved: hulls of three balls of different radii, about one centre: overlaps are the same over
 // whole regions of directions.
 TEST(SavedCases, hulls_of_balls_about_one_centre) {

@@ -22,6 +22,7 @@ constexpr double kMostNoise = 0.05;     // of the tolerance
 constexpr double kWidest = 0.5;         // rad: no bends are asked for beyond
 constexpr double kAxial = 3;            // of a cell's half width: nearer to an axis circles are points
 constexpr double kRounded = 1 - 1e-12;  // of a profile's radii
+constexpr double kCircleRate = 1.155;   // 2 / sqrt(3), of a circle's bend: see cell_search.h
 constexpr double kNarrow = 2e-3;        // rad: in cells of less, three pieces may be level
 constexpr double kWitness = 1e-3;       // rad, about the minimum, of pieces that may carry it
 
@@ -159,18 +160,21 @@ class CellSearch {
     const Vec3 across = e - cosine * s.axis;
     const double sine = across.norm();
     const Vec3 n = s.turn * on.normal;
-    double ball = 0;
-    const double range = kChord * (reach + (n - e).norm());
-    if (range < kWidest) ball = kRounded * s.scale * s.shape->profile_radii.within(cosine, sine, range);
+    const auto ball_within = [&](double chord) {
+      const double range = kChord * chord;
+      return range < kWidest ? kRounded * s.scale * s.shape->profile_radii.within(cosine, sine, range) : 0;
+    };
+    const double ball = ball_within(reach + (n - e).norm());
     circle(s, e, t, u, reach, s.centre + s.scale * (s.turn * on.point), n, ball, sine, out);
-    if (ball > 0 || !(sine > kAxial * reach) || reach > kWidest) return;
-    // A crease, it may be: circles on either side.
+    if (!(sine > kAxial * reach) || reach > kWidest) return;
+    // A crease, it may be, or a line that rounded edges bound: circles on either side.
     const Vec3 out_of_axis = across / sine, over = cosine * out_of_axis - sine * s.axis;
     for (const double off : {-reach, reach}) {
       const Vec3 other = (e + off * over).normalized();
       const HullPoint beside = hull_point(s, other);
-      circle(s, e, t, u, reach, s.centre + s.scale * (s.turn * beside.point), s.turn * beside.normal, 0, sine,
-             out);
+      const Vec3 normal = s.turn * beside.normal;
+      const double there = ball > 0 ? ball_within(reach + (normal - e).norm()) : 0;
+      circle(s, e, t, u, reach, s.centre + s.scale * (s.turn * beside.point), normal, there, sine, out);
     }
   }
 
@@ -188,7 +192,8 @@ class CellSearch {
       const Vec2 along(round.dot(t), round.dot(u));
       p.x = s.point + left * outward + (z - ball * nz) * s.axis + ball * e;
       p.bend = ball * Mat2::Identity() + left / sine * along * along.transpose();
-      p.rate = std::abs(left) * (5 / (least * least) + reach / sine);
+      p.rate =
+          kCircleRate * std::abs(left) * std::min(1.0, std::abs(e.dot(s.axis)) + reach) / (least * least);
     } else {
       ball = nr * ball > r ? r / nr : ball;
       p.bend = ball * Mat2::Identity();
@@ -256,7 +261,7 @@ class CellSearch {
 
   // Of the higher of two, on either side of the line on which they are level. `left_p`, `left_q`: left out.
   static double least_of(const Mean& p, const Mean& q, const Range& range, double left_p, double left_q,
-                         Vec2* where) {
+                         double enough, Vec2* where) {
     const Vec2 apart = q.slope - p.slope;
     const double steep = apart.norm(), r = range.sine;
     if (!(steep > 0)) return -kFarAway;
@@ -266,7 +271,31 @@ class CellSearch {
     const double low = least_in_box(p, across, -r, level, r, where) - left_p,
                  high = least_in_box(q, across, level, r, r, &other) - left_q;
     if (high < low) *where = other;
-    return std::min(low, high);
+    const double least = std::min(low, high);
+    // Where they are level is a line but to second order: in a strip along it that holds it, their mean that
+    // is level across it.
+    double share;
+    if (least >= enough || !level_across(p, q, across, &share)) return least;
+    const Mat2 differ = (q.bend - p.bend) - (q.y - p.y) * Mat2::Identity();
+    const double strip = differ.norm() * r * r / steep;
+    const double from = std::max(-r, level - strip), to = std::min(r, level + strip);
+    const Mean both = Mean::of(p, 1 - share, q, share);
+    Vec2 at;
+    double better = least_in_box(both, across, from, to, r, &at) - left_out(both, range);
+    const auto take = [&](double value, const Vec2& x) {
+      if (value < better) better = value, at = x;
+    };
+    if (from > -r) take(least_in_box(p, across, -r, from, r, &other) - left_p, other);
+    if (to < r) take(least_in_box(q, across, to, r, r, &other) - left_q, other);
+    if (better > least) *where = at;
+    return std::max(least, better);
+  }
+
+  // The mean of two that has no slope across the line on which they are level, if it is between them.
+  static bool level_across(const Mean& p, const Mean& q, const Vec2& across, double* share) {
+    const double sp = p.slope.dot(across), sq = q.slope.dot(across);
+    *share = -sp / (sq - sp);
+    return sp < 0 && sq > 0;
   }
 
   // The best bound that the pieces give, alone, by two, and, where three are level, by their means.
@@ -286,7 +315,7 @@ class CellSearch {
       if (take(least_of(mean[i], range, left[i], &at))) return best;
     for (int i = 0; i < count; ++i)
       for (int j = i + 1; j < count; ++j)
-        if (take(least_of(mean[i], mean[j], range, left[i], left[j], &at))) return best;
+        if (take(least_of(mean[i], mean[j], range, left[i], left[j], enough, &at))) return best;
     if (reach > kNarrow) return best;
     for (int i = 0; i < count; ++i)
       for (int j = i + 1; j < count; ++j)

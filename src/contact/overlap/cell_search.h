@@ -17,8 +17,12 @@ namespace nurbs {
 // bends: the solution of y'' + y = w - rate t). Of two pairs that make a crease each is taken on its side;
 // where three meet, their mean without slope. Cells of a cube map are halved until each lies above the least
 // p found, less most of the tolerance. A cell costs some 1 us.
-// A circle of radius R about the axis a has the support R |d x a|, whose bend is R / |d x a| round the axis
-// and changes by at most 5 R / |d x a|^2 a radian; with R < 0, where balls are wider than the body, too.
+// A circle of radius R about the axis a has the support R s, s = |d x a|. Along a great circle d(t), whose
+// plane's normal m is fixed, it bends by R (m.a)^2 / s^3, which changes by 3 R (m.a)^2 (d.a)(d'.a) / s^5 a
+// radian; (m.a)^2 and (d'.a)^2 add up to s^2, so that is 2 / sqrt(3) R |d.a| / s^2 at most. With R < 0, where
+// balls are wider than the body, too.
+// Two pairs of a crease are level along a curve: between them, in a strip that holds it, their mean that has
+// no slope across it lies below both and is as high to second order.
 // Hypotheses: those of the pieces (body/sphero_polyhedron.h, body/profile_radii.h).
 bool search_cells(const PairFrame& pair, double tolerance, PolytopeResult* result);
 
