@@ -4,6 +4,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
+#include <cstdlib>
 #include <functional>
 #include <map>
 
@@ -122,9 +124,9 @@ struct Sum {
   bool flat = false;
 };
 
-Sum search(const Particle& p, const Mesh& mesh) {
+Sum search(const Particle& p, const Mesh& mesh, double crack = 0) {
   MeshPatch patch;
-  patch.build(mesh.triangles.data(), static_cast<int>(mesh.triangles.size()), 1e-7);
+  patch.build(mesh.triangles.data(), static_cast<int>(mesh.triangles.size()), 1e-7, 0, crack);
   ContactSettings settings;
   settings.reach = 0;
   SurfaceContacts contacts;
@@ -258,6 +260,70 @@ TEST(SurfaceSearch, ForceAndEnergyDoNotKnowHowTheMeshIsCut) {
 }
 
 // As where two meshes have a plate in common, each with its own side of it.
+double rounded(double x, int digits) {
+  char text[40];
+  std::snprintf(text, sizeof text, "%.*g", digits, x);
+  return std::atof(text);
+}
+
+// Two rectangles that meet at an angle along x = 0, > 0 where they make a ridge, turned and then rounded: the
+// one of two triangles, the other in strips of them, or in one.
+Mesh bent(double angle, int strips, const Mat3& turn, int digits, double gap = 0) {
+  constexpr double size = 1;
+  Mesh mesh;
+  const auto at = [&](double x, double y) {
+    Vec3 p = turn * (x > 0 ? Vec3(x * std::cos(angle), y, -x * std::sin(angle)) : Vec3(x, y, 0));
+    for (int i = 0; i < 3; ++i) p[i] = rounded(p[i], digits);
+    return p;
+  };
+  const auto strip = [&](double from, double to, double low, double high) {
+    mesh.add(at(from, low), at(to, low), at(to, high));
+    mesh.add(at(from, low), at(to, high), at(from, high));
+  };
+  strip(-size, 0, -size, size);
+  for (int k = 0; k < strips; ++k)
+    strip(gap, size, (2.0 * k / strips - 1) * size, (2.0 * (k + 1) / strips - 1) * size);
+  return mesh;
+}
+
+// Corners on another triangle's side are off it by the digits that they are written with, and leave wedges in
+// which a body exactly on the seam would be on no triangle.
+TEST(SurfaceSearch, SeamsOfFewDigitsHold) {
+  Random random(12);
+  constexpr double scale = 0.1, depth = 1e-3;
+  for (const test::ShapePointer& shape : {test::sphere(), test::ellipsoid()})
+    for (const double angle : {0.0, 1e-4, -1e-4, 0.1, -0.1, 0.8, 1.5})
+      for (const int digits : {17, 8, 7, 6})
+        for (int k = 0; k < 20; ++k) {
+          const Mat3 turn = random.turn().toRotationMatrix();
+          Particle p;
+          p.shape = shape.get();
+          p.scale = scale;
+          p.q = random.turn();
+          const Vec3 up = turn * Vec3(std::sin(angle / 2), 0, std::cos(angle / 2));
+          const double off = k % 2 ? (random.below(2) ? 1 : -1) * random.log_uniform(1e-12, 1e-5) : 0;
+          const Vec3 on_seam = turn * Vec3(off, random.uniform(-0.7, 0.7), 0);
+          const Vec3 below = scale * (p.q * find_support(*shape, p.q.conjugate() * -up).point);
+          p.x = on_seam - below - depth * scale * up;
+          const Vec3 whole = search(p, bent(angle, 1, turn, 17)).force,
+                     cut = search(p, bent(angle, 7, turn, digits), 1e-4 * scale).force;
+          EXPECT_LT((cut - whole).norm(), (digits > 16 ? 1e-6 : 0.05) * whole.norm())
+              << angle << " " << digits << " " << off;
+        }
+}
+
+// So do cracks along a row of corners, up to where they are told from none.
+TEST(SurfaceSearch, NarrowCracksAreNone) {
+  Particle p;
+  p.shape = test::sphere().get();
+  p.x = Vec3(0, 0.3, 0.99);
+  const auto force = [&](double gap) {
+    return search(p, bent(0, 1, Mat3::Identity(), 17, gap), 1e-4).force[2];
+  };
+  for (const double gap : {1e-12, 1e-8, 1e-5, 9e-5}) EXPECT_NEAR(force(gap), 0.01, 1e-6) << gap;
+  EXPECT_NEAR(force(2e-4), 0.02, 1e-4);  // two borders, both of which the body meets
+}
+
 TEST(SurfaceSearch, TrianglesThatAreThereTwiceCountOnce) {
   Random random(11);
   for (const auto& shape : bodies())

@@ -21,10 +21,11 @@ constexpr double kOnePlane = 1e-3;  // of the distance within which corners are 
 
 }  // namespace
 
-void MeshPatch::build(const Triangle* triangles, int count, double distance, double flat) {
+void MeshPatch::build(const Triangle* triangles, int count, double distance, double flat, double crack) {
   unbounded_ = false;
   weld(triangles, count, distance);
-  split_sides(distance);
+  if (crack > distance) close_cracks(crack);
+  split_sides(std::max(crack, distance));
   find_planes(triangles, std::max(flat, kOnePlane * distance));
   find_edges();
   link_vertices();
@@ -68,7 +69,7 @@ void MeshPatch::weld(const Triangle* triangles, int count, double distance) {
   for (int t = 0; t < count; ++t) {
     const Triangle& triangle = triangles[t];
     if (!(2 * area_vector(triangle).norm() > kNoArea * longest_side2(triangle))) continue;
-    int at[3];
+    std::array<int, 3> at;
     for (int k = 0; k < 3; ++k) {
       at[k] = -1;
       const double x = triangle[k][0];
@@ -80,21 +81,21 @@ void MeshPatch::weld(const Triangle* triangles, int count, double distance) {
       vertices_.push_back({triangle[k], t, k, 0, 0, 0, 0, false});
       by_x.insert(std::lower_bound(by_x.begin(), by_x.end(), std::make_pair(x, at[k])), {x, at[k]});
     }
-    if (at[0] == at[1] || at[1] == at[2] || at[2] == at[0] || has_cell(at)) continue;
-    cells_.push_back({t, -1, static_cast<int>(corners_.size()), 3});
-    corners_.insert(corners_.end(), at, at + 3);
+    add_cell(at, t);
   }
 }
 
-// Whether there is a triangle of three vertices; cells are triangles still.
-bool MeshPatch::has_cell(const int (&at)[3]) const {
-  return std::any_of(cells_.begin(), cells_.end(), [&](const Cell& cell) {
-    return std::is_permutation(at, at + 3, corners_.begin() + cell.first);
-  });
+// A triangle of three vertices, if it is one and there is none of them yet.
+void MeshPatch::add_cell(const std::array<int, 3>& at, int triangle) {
+  if (at[0] == at[1] || at[1] == at[2] || at[2] == at[0]) return;
+  for (const Cell& cell : cells_)
+    if (std::is_permutation(at.begin(), at.end(), corners_.begin() + cell.first)) return;
+  cells_.push_back({triangle, -1, static_cast<int>(corners_.size()), 3});
+  corners_.insert(corners_.end(), at.begin(), at.end());
 }
 
-// Splits the sides without a partner where another such side's corner lies on them.
-void MeshPatch::split_sides(double distance) {
+// The sides of triangles that no other has; cells are triangles still.
+std::vector<MeshPatch::Key> MeshPatch::lonely_sides() {
   keys_.clear();
   for (std::size_t c = 0; c < cells_.size(); ++c)
     for (int k = 0; k < 3; ++k) {
@@ -112,6 +113,42 @@ void MeshPatch::split_sides(double distance) {
     };
     if (!same(i + 1) && (i == 0 || !same(i - 1))) lonely.push_back(keys_[i]);
   }
+  return lonely;
+}
+
+// Makes one of the ends of lonely sides that are within a distance.
+void MeshPatch::close_cracks(double distance) {
+  std::vector<int> ends;
+  for (const Key& side : lonely_sides()) {
+    ends.push_back(side.low);
+    ends.push_back(side.high);
+  }
+  std::sort(ends.begin(), ends.end());
+  ends.erase(std::unique(ends.begin(), ends.end()), ends.end());
+  std::vector<int> one(vertices_.size());
+  for (std::size_t v = 0; v < one.size(); ++v) one[v] = static_cast<int>(v);
+  bool any = false;
+  for (std::size_t i = 0; i < ends.size(); ++i)
+    for (std::size_t j = 0; j < i; ++j)
+      if (one[ends[j]] == ends[j] &&
+          (vertices_[ends[i]].x - vertices_[ends[j]].x).squaredNorm() <= distance * distance) {
+        one[ends[i]] = ends[j];
+        any = true;
+        break;
+      }
+  if (!any) return;
+  std::vector<Cell> cells;
+  std::vector<int> corners;
+  cells.swap(cells_);
+  corners.swap(corners_);
+  for (const Cell& cell : cells)
+    add_cell({one[corners[cell.first]], one[corners[cell.first + 1]], one[corners[cell.first + 2]]},
+             cell.triangle);
+}
+
+// Splits the sides without a partner where another such side's corner lies on them.
+void MeshPatch::split_sides(double distance) {
+  const std::vector<Key> lonely = lonely_sides();
   struct Split {
     int cell, slot;
     double along;
@@ -135,7 +172,9 @@ void MeshPatch::split_sides(double distance) {
         splits.push_back({side.cell, k, forward ? t : 1 - t, v});
       }
   }
+  splits_.assign(corners_.size(), 0);
   if (splits.empty()) return;
+  splits_.clear();
   std::sort(splits.begin(), splits.end(), [](const Split& a, const Split& b) {
     return a.cell != b.cell ? a.cell < b.cell : a.slot != b.slot ? a.slot < b.slot : a.along < b.along;
   });
@@ -148,12 +187,27 @@ void MeshPatch::split_sides(double distance) {
     cell.first = static_cast<int>(corners_.size());
     for (int k = 0; k < 3; ++k) {
       corners_.push_back(old[from + k]);
+      splits_.push_back(0);
       for (; next < splits.size() && splits[next].cell == static_cast<int>(c) && splits[next].slot == k;
-           ++next)
+           ++next) {
         corners_.push_back(splits[next].vertex);
+        splits_.push_back(1);
+      }
     }
     cell.corners = static_cast<int>(corners_.size()) - cell.first;
   }
+}
+
+bool MeshPatch::is_beside(const Cell& cell, int k, const Vec3& x) const {
+  const int end = k + 1 < cell.corners ? k + 1 : 0;
+  const auto at = [&](int i) -> const Vec3& { return vertices_[corners_[cell.first + i]].x; };
+  const auto splits = [&](int i) { return splits_[cell.first + i] != 0; };
+  if (!splits(k) && !splits(end)) return true;
+  int from = k, to = end;
+  while (splits(from)) --from;  // a cell begins with a corner of its own
+  while (splits(to)) to = to + 1 < cell.corners ? to + 1 : 0;
+  const Vec3 way = at(to) - at(from);
+  return (!splits(k) || way.dot(x - at(k)) >= 0) && (!splits(end) || way.dot(x - at(end)) < 0);
 }
 
 // The largest triangles lay down the planes; those whose corners lie in one belong to it.

@@ -55,8 +55,9 @@ class MeshPatch {
 
   // From triangles in an order that does not depend on ranks; corners closer than `weld` (length) are one.
   // Triangles without area are left out, and those with the corners of an earlier one. Triangles within
-  // `flat` (length) of a larger one's plane lie in it. O(n^2) in the number of triangles.
-  void build(const Triangle* triangles, int count, double weld, double flat = 0);
+  // `flat` (length) of a larger one's plane lie in it. Borders within `crack` (length) of each other are
+  // none: files of few digits open them where triangles do not conform. O(n^2) in the number of triangles.
+  void build(const Triangle* triangles, int count, double weld, double flat = 0, double crack = 0);
   // A single plane without bounds.
   void build_plane(const Vec3& origin, const Vec3& normal);
   // The same triangles somewhere else.
@@ -78,6 +79,12 @@ class MeshPatch {
   double sign_of(int i) const { return signs_[i]; }  // of the cell of corner i about its side from there
   int corner(int i) const { return corners_[i]; }
   int edge_of(int i) const { return edge_of_[i]; }
+  // Whether the side from a cell's corner k on is what bounds the cell beside x: of a triangle's side that
+  // corners of others split it is the piece that x is beside. Those corners are off the side by round-off,
+  // where the pieces' lines, taken for endless, would leave wedges that no cell has.
+  bool bounds(const Cell& cell, int k, const Vec3& x) const {
+    return cell.corners == 3 || is_beside(cell, k, x);
+  }
   // What of a plane is wall; stays until the triangles move.
   const PlaneCells& cells_of(int plane);
   std::size_t bytes() const;
@@ -87,7 +94,10 @@ class MeshPatch {
     int low, high, cell, slot;
   };
   void weld(const Triangle* triangles, int count, double distance);
-  bool has_cell(const int (&at)[3]) const;
+  void add_cell(const std::array<int, 3>& at, int triangle);
+  std::vector<Key> lonely_sides();
+  void close_cracks(double distance);
+  bool is_beside(const Cell& cell, int k, const Vec3& x) const;
   void split_sides(double distance);
   void find_planes(const Triangle* triangles, double distance);
   void find_edges();
@@ -104,6 +114,7 @@ class MeshPatch {
   std::vector<Plane> planes_;
   std::vector<int> corners_, edge_of_, edges_at_, cells_at_, cells_in_, edges_in_, vertices_in_, order_;
   std::vector<double> signs_;
+  std::vector<char> splits_;  // corners of other triangles, on a side of the cell's own
   std::vector<Key> keys_;
   std::vector<std::pair<double, int>> by_x_;
   std::vector<PlaneCells> outlines_;  // by plane; empty until asked for

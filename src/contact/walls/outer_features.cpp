@@ -268,7 +268,10 @@ void SurfaceSearch::touch_outer_edge(int number, const Arc& arc, bool active) {
     const SurfaceContact* other = beside[1 - i];
     const int there = instead_of(planes_[plane_of(e, i)].contact);
     if (!other || there < 0 || leads_in(&out_.contact[there], e, i, arc)) continue;
-    const bool shorter = out_.contact[there].gap > other->gap && f.gap > other->gap;
+    // As short is short enough, once: at the line itself a corner is over both faces.
+    const double as_short = other->gap - kWithin * radius_;
+    const bool shorter =
+        &out_.contact[there] != other && out_.contact[there].gap > as_short && f.gap > as_short;
     if (shorter || leads_in(other, e, 1 - i, arc)) drop(other, there);
   }
 }

@@ -228,7 +228,9 @@ Vec3 SurfaceSearch::nearest(const MeshPatch::Cell& cell, const MeshPatch::Plane&
     const MeshPatch::Edge& e = patch_.edges()[patch_.edge_of(cell.first + k)];
     const Vec3& a = patch_.vertices()[e.v[0]].x;
     const Vec3 off = c - a;
-    if (patch_.sign_of(cell.first + k) * plane.normal.cross(e.direction).dot(off) >= 0) continue;
+    if (patch_.sign_of(cell.first + k) * plane.normal.cross(e.direction).dot(off) >= 0 ||
+        !patch_.bounds(cell, k, c))
+      continue;
     inside = false;
     const Vec3 y = a + std::clamp(e.direction.dot(off), 0.0, e.length) * e.direction;
     if ((c - y).squaredNorm() < least2) least2 = (c - y).squaredNorm(), best = y;
@@ -294,11 +296,11 @@ double SurfaceSearch::inside(const ActivePlane& met, const MeshPatch::Plane& pla
 bool SurfaceSearch::holds(int number, const ActivePlane& met) const {
   const MeshPatch::Cell& cell = patch_.cells()[number];
   const MeshPatch::Plane& plane = patch_.planes()[cell.plane];
+  const Vec3 x = particle_.x + met.deepest;
   for (int k = 0; k < cell.corners; ++k) {
-    const int edge = patch_.edge_of(cell.first + k);
-    const MeshPatch::Edge& e = patch_.edges()[edge];
+    const MeshPatch::Edge& e = patch_.edges()[patch_.edge_of(cell.first + k)];
     const double s = patch_.sign_of(cell.first + k) * inside(met, plane, e);
-    if (!(e.inner ? s >= 0 : s > 0)) return false;
+    if (!(e.inner ? s >= 0 : s > 0) && patch_.bounds(cell, k, x)) return false;
   }
   return true;
 }
@@ -334,10 +336,10 @@ Vec3 SurfaceSearch::crossing(int number, const Vec3& deepest, double gap) const 
 
 bool SurfaceSearch::in_cell(const MeshPatch::Cell& cell, const Vec3& x) const {
   const Vec3& normal = patch_.planes()[cell.plane].normal;
-  for (int k = cell.first; k < cell.first + cell.corners; ++k) {
-    const MeshPatch::Edge& e = patch_.edges()[patch_.edge_of(k)];
+  for (int k = 0; k < cell.corners; ++k) {
+    const MeshPatch::Edge& e = patch_.edges()[patch_.edge_of(cell.first + k)];
     const double s = normal.cross(e.direction).dot(x - patch_.vertices()[e.v[0]].x);
-    if (!(patch_.sign_of(k) * s > -kWithin * radius_)) return false;
+    if (!(patch_.sign_of(cell.first + k) * s > -kWithin * radius_) && patch_.bounds(cell, k, x)) return false;
   }
   return true;
 }
