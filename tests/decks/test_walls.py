@@ -151,6 +151,20 @@ class Meshes(unittest.TestCase):
             two = run("mesh m n", before=MESH + OTHER, mesh=floor, files={"other.stl": stl(common)})
             np.testing.assert_allclose(frames(two), frames(one), rtol=0, atol=1e-12)
 
+    def test_balls_rest_on_a_seam_of_strips(self):
+        """One long side meets seven short ones, whose corners single precision leaves beside it."""
+        turn = np.array([[np.cos(0.4), -np.sin(0.4), 0], [np.sin(0.4), np.cos(0.4), 0], [0, 0, 1]])
+        y = np.linspace(-0.16, 0.16, 8)
+        floor = [((-0.16, -0.16, 0), (0, -0.16, 0), (0, 0.16, 0)), ((-0.16, -0.16, 0), (0, 0.16, 0), (-0.16, 0.16, 0))]
+        for low, high in zip(y, y[1:]):
+            floor += [((0, low, 0), (0.16, low, 0), (0.16, high, 0)), ((0, low, 0), (0.16, high, 0), (0, high, 0))]
+        floor = [tuple(map(tuple, np.float32(np.array(t) @ turn.T).tolist())) for t in floor]
+        places = [turn @ (0, along, 0.0041) for along in np.linspace(-0.13, 0.13, 31)]
+        balls = [(1 + k, 1, 1, 0.004, 2500.0, *place, 1.0, 0.0, 0.0, 0.0) for k, place in enumerate(places)]
+        rest = frames(run("mesh m", balls, (), mesh=floor, before=MESH, body=shape("sphere", 1), steps="run 6000"))[-1]
+        self.assertEqual(len(rest), 31)
+        np.testing.assert_allclose(rest[:, 2], 0.004, rtol=0, atol=2e-4)
+
     def test_plates_overlap_in_nearly_one_plane(self):
         """As single precision leaves them: nothing touches the border of one where it lies in the other."""
         left, right = sheet(3, 0.1, y_size=0.18), sheet(2, 0.095, y_size=0.15)
