@@ -390,6 +390,7 @@ class Ladder {
       hull.bracket.lower = lower;
       hull.gap = gap;
     } else {
+      if (hull.inside) find_points_again(pair, tolerance, &hull);
       locate(pair, &hull.points);
     }
     hull.converged = hull.bracket.width() <= tolerance;

@@ -155,5 +155,31 @@ TEST(DeepContacts, a_narrow_strip_is_no_pole) {
   }
 }
 
+// A round apex deep over the middle of a face: the bracket closed by other means, the hull stayed coarse, and
+// the point of the apex came out beside it by up to 0.4 of its size, gap and normal right.
+TEST(DeepContacts, AnApexOverAFaceIsTouchedThere) {
+  Random random(1);
+  const ShapePointer face = make_shape("tablet", tablet(1, 0.8, 0.05));
+  for (const ShapePointer& round :
+       {make_shape("lens", lens(1, 2, 0.05)), make_shape("ellipsoid", exact_ellipsoid(Vec3(1, 0.8, 0.6)))})
+    for (const double depth : {0.1, 0.3, 0.6})
+      for (int k = 0; k < 40; ++k) {
+        Particle a, b;
+        a.shape = face.get();
+        a.q = random.turn();
+        const Vec3 up = a.q * Vec3::UnitZ();
+        b.shape = round.get();
+        b.scale = 0.7;
+        b.q = (Quat(Eigen::AngleAxisd(random.uniform(0, 6), up)) * a.q).normalized();
+        b.x = (0.4 + b.scale * find_hull_support(*round, Vec3::UnitZ()).h - depth) * up;
+        double memory[kPairMemorySize] = {0};
+        const ContactResult r = find_contact(a, b, ContactSettings(), memory);
+        ASSERT_EQ(r.status, Status::converged);
+        ASSERT_NEAR(r.gap, -depth, 1e-9);
+        EXPECT_LT((r.point_b - b.x).cross(up).norm(), 1e-3) << round->name << " " << depth;
+        EXPECT_LT((r.point_b - r.point_a).cross(up).norm(), 1e-3) << round->name << " " << depth;
+      }
+}
+
 }  // namespace
 }  // namespace nurbs

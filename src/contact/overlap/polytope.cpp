@@ -151,4 +151,9 @@ PolytopeResult solve_polytope(const PairFrame& pair, const Vec3& seed, double to
   return best;
 }
 
+__attribute__((noinline)) void find_points_again(const PairFrame& pair, double tolerance, PolytopeResult* r) {
+  PolytopeResult better = *r;
+  if (PolytopeSearch(pair, tolerance, 0.0, false).find_points(&better) && !better.inside) *r = better;
+}
+
 }  // namespace nurbs

@@ -16,6 +16,7 @@ struct PolytopeResult {
   int iterations;       // support pairs evaluated
   bool converged;       // bracket no wider than the tolerance
   bool closed = false;  // in closed form: points and direction want no polish
+  bool inside = false;  // the points are means of others far inside the bodies, moved out to their planes
 };
 
 // Moves the points along the normal, half each, until they are the gap apart.
@@ -60,5 +61,8 @@ inline PolytopeResult solve_polytope(const PairFrame& pair, const Vec3& seed, do
   SearchedBalls balls;
   return solve_polytope(pair, seed, tolerance, enough, &balls);
 }
+
+// Points of a bracket that were left so, from a hull that is made for them.
+void find_points_again(const PairFrame& pair, double tolerance, PolytopeResult* r);
 
 }  // namespace nurbs

@@ -10,6 +10,18 @@ namespace {
 constexpr double kPlaneBeyond = 4;     // times the least distance, squared: no triangle in it is nearer
 constexpr double kFacingBetter = 0.1;  // of kFacing, that better witnesses are to be off
 constexpr int kMostFacing = 96;        // points spent on better ones
+constexpr double kTilt = 1e-6;         // rad: what a support moves by tells faces from points
+constexpr double kOnePoint = 1e-3;     // of the bounding radius, that it moves by where it is one
+
+// Whether a point in the plane of the support along d, in the shape's axes, is beside the support, which is
+// one point: not on a face or an edge.
+bool is_beside(const HullPoints& points, double radius, const Vec3& d, const Vec3& x) {
+  const Vec3 at = points.along(d).point, t = d.unitOrthogonal(), s = d.cross(t);
+  if ((x - at).norm() < 2 * kOnePoint * radius) return false;
+  for (const Vec3& way : {t, Vec3(-0.5 * t + 0.866 * s), Vec3(-0.5 * t - 0.866 * s)})
+    if ((points.along((d + kTilt * way).normalized()).point - at).norm() > kOnePoint * radius) return false;
+  return true;
+}
 
 }  // namespace
 
@@ -65,6 +77,12 @@ PolytopeResult PolytopeSearch::with_points(const Vec3& a, const Vec3& b) const {
   r.points.b = b + (direction_.dot(w.b - b) - shrink_b_) * direction_;
   r.points.on_a = surface_place(*pair_.a, w.on_a, direction_);
   r.points.on_b = surface_place(*pair_.b, w.on_b, pair_.direction_on_b(direction_));
+  const double little = kFacing * pair_.size;
+  r.inside = (direction_.dot(w.a - a) > little &&
+              is_beside(points_a_, pair_.a->bounding_radius, direction_, r.points.a / pair_.scale_a)) ||
+             (direction_.dot(b - w.b) > little &&
+              is_beside(points_b_, pair_.b->bounding_radius, pair_.direction_on_b(direction_),
+                        pair_.turn.transpose() * (r.points.b - pair_.offset) / pair_.scale_b));
   set_gap(&r);
   return r;
 }
