@@ -160,9 +160,10 @@ void MeshPatch::split_sides(double distance) {
     const Vec3 &p = vertices_[side.low].x, &q = vertices_[side.high].x, way = q - p;
     const double length2 = way.squaredNorm();
     std::fill(seen.begin(), seen.end(), 0);
+    for (int k = 0; k < 3; ++k) seen[corners_[cells_[side.cell].first + k]] = 1;  // its own: a needle's
     for (const Key& other : lonely)
       for (const int v : {other.low, other.high}) {
-        if (v == side.low || v == side.high || seen[v]) continue;
+        if (seen[v]) continue;
         seen[v] = 1;
         const Vec3 x = vertices_[v].x - p;
         const double t = x.dot(way) / length2;
