@@ -292,7 +292,7 @@ TEST(SurfaceSearch, SeamsOfFewDigitsHold) {
   Random random(12);
   constexpr double scale = 0.1, depth = 1e-3;
   for (const test::ShapePointer& shape : {test::sphere(), test::ellipsoid()})
-    for (const double angle : {0.0, 1e-4, -1e-4, 0.1, -0.1, 0.8, 1.5})
+    for (const double angle : {0.0, 1e-4, -1e-4, 0.1, -0.1, 0.8, -0.8, 1.5, -1.5})
       for (const int digits : {17, 8, 7, 6})
         for (int k = 0; k < 20; ++k) {
           const Mat3 turn = random.turn().toRotationMatrix();
@@ -310,6 +310,33 @@ TEST(SurfaceSearch, SeamsOfFewDigitsHold) {
           EXPECT_LT((cut - whole).norm(), (digits > 16 ? 1e-6 : 0.05) * whole.norm())
               << angle << " " << digits << " " << off;
         }
+}
+
+// A corner of a box near the line of a ridge, which is as many lines as there are strips: it may count for
+// both faces where they are equally far, and for no more. One whose vertices were taken for tips gave it all
+// the box's size.
+TEST(SurfaceSearch, CornersOnSeamsOfFewDigits) {
+  Random random(13);
+  constexpr double scale = 0.1, depth = 1e-3;
+  const test::ShapePointer shape = test::cuboid();
+  for (const double angle : {0.1, -0.1, 0.8, -0.8, 1.5, -1.5})
+    for (const int digits : {17, 6})
+      for (int k = 0; k < 150; ++k) {
+        const Mat3 turn = random.turn().toRotationMatrix();
+        Particle p;
+        p.shape = shape.get();
+        p.scale = scale;
+        p.q = random.turn();
+        const Vec3 up = turn * Vec3(std::sin(angle / 2), 0, std::cos(angle / 2));
+        const Vec3 near_seam =
+            turn * Vec3(random.sign() * random.log_uniform(1e-12, 1e-3), random.uniform(-0.7, 0.7), 0);
+        const Vec3 below = scale * (p.q * find_support(*shape, p.q.conjugate() * -up).point);
+        p.x = near_seam - below - depth * scale * up;
+        const double whole = search(p, bent(angle, 1, turn, 17)).force.norm(),
+                     cut = search(p, bent(angle, 7, turn, digits), 1e-4 * scale).force.norm();
+        EXPECT_LE(cut, 2.5 * whole) << angle << " " << digits << " " << k;
+        EXPECT_GE(cut, 0.4 * whole) << angle << " " << digits << " " << k;
+      }
 }
 
 // So do cracks along a row of corners, up to where they are told from none.

@@ -85,6 +85,8 @@ class MeshPatch {
   bool bounds(const Cell& cell, int k, const Vec3& x) const {
     return cell.corners == 3 || is_beside(cell, k, x);
   }
+  // Whether the corner is another triangle's, on a side of the cell's own.
+  bool splits_side(int i) const { return splits_[i] != 0; }
   // What of a plane is wall; stays until the triangles move.
   const PlaneCells& cells_of(int plane);
   std::size_t bytes() const;

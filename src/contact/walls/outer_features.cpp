@@ -30,11 +30,26 @@ SurfaceSearch::Cone SurfaceSearch::cone_at(int number) const {
       low = std::min(low, height);
       high = std::max(high, height);
     }
+    for (int k = 0; k < v.cells; ++k) {  // of a side that goes straight on here, into its cell
+      const double height = n.dot(into_split(patch_.cell_at(v.first_cell + k), number));
+      low = std::min(low, height);
+      high = std::max(high, height);
+    }
     if (std::min(-low, high) > kOneSide) return Cone::other;
     const double off = n.dot(particle_.x - v.x);
     outside = outside || (high > -low ? off < 0 : off > 0);
   }
   return outside ? Cone::outside : Cone::around;
+}
+
+// From a vertex within a side of a cell into that, square to the side; zero of its corners.
+Vec3 SurfaceSearch::into_split(int number, int vertex) const {
+  const MeshPatch::Cell& cell = patch_.cells()[number];
+  for (int k = cell.first; k < cell.first + cell.corners; ++k)
+    if (patch_.corner(k) == vertex && patch_.splits_side(k))
+      return patch_.sign_of(k) *
+             patch_.planes()[cell.plane].normal.cross(patch_.edges()[patch_.edge_of(k)].direction);
+  return Vec3::Zero();
 }
 
 // The normals of the wall at an edge that stands out towards the body: from one face's to the other's,
@@ -299,6 +314,10 @@ bool SurfaceSearch::touch_outer_vertex(int number, const Vec3& guess) {
     const MeshPatch::Edge& e = patch_.edges()[patch_.edge_at(v.first_edge + i)];
     edges.push_back(away(e, number) * e.direction);
   }
+  for (int i = 0; i < v.cells; ++i) {
+    const Vec3 in = into_split(patch_.cell_at(v.first_cell + i), number);
+    if (in.squaredNorm() > 0) edges.push_back(in);
+  }
   const auto is_normal = [&](const Vec3& d) {
     return std::all_of(edges.begin(), edges.end(), [&](const Vec3& e) { return e.dot(d) <= kOneSide; });
   };
@@ -325,7 +344,7 @@ bool SurfaceSearch::touch_outer_vertex(int number, const Vec3& guess) {
   FeatureContact f;
   bool own = find_only_way_out(particle_, v.x, guess, from, &f);
   if (!own || (!f.touching && !is_normal(f.normal))) {
-    f = find_highest_point_contact(particle_, v.x, edges.data(), v.edges, most, from);
+    f = find_highest_point_contact(particle_, v.x, edges.data(), static_cast<int>(edges.size()), most, from);
     // Where f is highest at the border of the normals and goes on to rise, an edge has the contact.
     const auto goes_on = [&](const Vec3& e) {
       return e.dot(f.normal) > -kBorder &&

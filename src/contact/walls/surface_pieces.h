@@ -139,6 +139,7 @@ class SurfaceSearch {
   // Edges and vertices that stand out.
   bool finds_sharp(double gap) const;
   Cone cone_at(int number) const;
+  Vec3 into_split(int number, int vertex) const;
   bool outer_arc(const MeshPatch::Edge& e, Arc* arc) const;
   int plane_of(const MeshPatch::Edge& e, int side) const;
   const SurfaceContact* kept(int contact) const;
