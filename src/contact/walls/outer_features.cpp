@@ -45,7 +45,7 @@ SurfaceSearch::Cone SurfaceSearch::cone_at(int number) const {
 // From a vertex within a side of a cell into that, square to the side; zero of its corners.
 Vec3 SurfaceSearch::into_split(int number, int vertex) const {
   const MeshPatch::Cell& cell = patch_.cells()[number];
-  for (int k = cell.first; k < cell.first + cell.corners; ++k)
+  for (int k = cell.first; cell.corners > 3 && k < cell.first + cell.corners; ++k)
     if (patch_.corner(k) == vertex && patch_.splits_side(k))
       return patch_.sign_of(k) *
              patch_.planes()[cell.plane].normal.cross(patch_.edges()[patch_.edge_of(k)].direction);
