@@ -12,10 +12,10 @@ namespace {
 
 constexpr double kMargin =
     0.2;  // of the bounding radius, between the body's sphere and triangles of no concern
-constexpr double kWeld = 1e-6;   // of the bounding radius: corners of a mesh this close are one
-constexpr double kCrack = 1e-4;  // of that: borders this close are none
+constexpr double kWeld = 1e-6;  // of the bounding radius: corners of a mesh this close are one
+constexpr double kCrack = 100;  // times that: borders this close are none
 constexpr double kApart =
-    0.01;  // of that, by which meshes may have moved against each other and be as before
+    0.01;  // of kWeld, by which meshes may have moved against each other and be as before
 // What of a body's overlap its flat faces make of a bent mesh's unevenness: below it the mesh is flat to
 // them. Bits of single precision that STL files round corners to would have them stand on points that come
 // and go.
@@ -251,8 +251,7 @@ void SurfaceWall::gather(const Patch& patch, const std::vector<TriangleArray>& m
 
 // From the triangles gathered. Corners and planes of several meshes are one only while those keep together.
 void SurfaceWall::build(double weld, Patch* patch) const {
-  patch->mesh.build(triangles_.data(), static_cast<int>(triangles_.size()), weld, patch->flat,
-                    kCrack / kWeld * weld);
+  patch->mesh.build(triangles_.data(), static_cast<int>(triangles_.size()), weld, patch->flat, kCrack * weld);
   patch->poses.clear();
   if (patch->near.empty() || near_[patch->near.front()].mesh == near_[patch->near.back()].mesh) return;
   const auto area2 = [&](int k) {

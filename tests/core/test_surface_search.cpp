@@ -259,7 +259,6 @@ TEST(SurfaceSearch, ForceAndEnergyDoNotKnowHowTheMeshIsCut) {
     }
 }
 
-// As where two meshes have a plate in common, each with its own side of it.
 double rounded(double x, int digits) {
   char text[40];
   std::snprintf(text, sizeof text, "%.*g", digits, x);
@@ -286,57 +285,39 @@ Mesh bent(double angle, int strips, const Mat3& turn, int digits, double gap = 0
   return mesh;
 }
 
+// A body that its support is `depth` below such a seam, `off` beside it; what the seam's whole sides and one
+// of strips make of it, of as many digits.
+struct OnSeam {
+  Vec3 whole, cut;  // forces
+
+  OnSeam(const Shape& shape, double angle, int digits, double off, Random& random) {
+    constexpr double scale = 0.1, depth = 1e-3;
+    const Mat3 turn = random.turn().toRotationMatrix();
+    Particle p;
+    p.shape = &shape;
+    p.scale = scale;
+    p.q = random.turn();
+    const Vec3 up = turn * Vec3(std::sin(angle / 2), 0, std::cos(angle / 2));
+    const Vec3 seam = turn * Vec3(off, random.uniform(-0.7, 0.7), 0);
+    p.x = seam - scale * (p.q * find_support(shape, p.q.conjugate() * -up).point) - depth * scale * up;
+    whole = search(p, bent(angle, 1, turn, 17)).force;
+    cut = search(p, bent(angle, 7, turn, digits), 1e-4 * scale).force;
+  }
+};
+
 // Corners on another triangle's side are off it by the digits that they are written with, and leave wedges in
 // which a body exactly on the seam would be on no triangle.
 TEST(SurfaceSearch, SeamsOfFewDigitsHold) {
   Random random(12);
-  constexpr double scale = 0.1, depth = 1e-3;
   for (const test::ShapePointer& shape : {test::sphere(), test::ellipsoid()})
     for (const double angle : {0.0, 1e-4, -1e-4, 0.1, -0.1, 0.8, -0.8, 1.5, -1.5})
       for (const int digits : {17, 8, 7, 6})
         for (int k = 0; k < 20; ++k) {
-          const Mat3 turn = random.turn().toRotationMatrix();
-          Particle p;
-          p.shape = shape.get();
-          p.scale = scale;
-          p.q = random.turn();
-          const Vec3 up = turn * Vec3(std::sin(angle / 2), 0, std::cos(angle / 2));
-          const double off = k % 2 ? (random.below(2) ? 1 : -1) * random.log_uniform(1e-12, 1e-5) : 0;
-          const Vec3 on_seam = turn * Vec3(off, random.uniform(-0.7, 0.7), 0);
-          const Vec3 below = scale * (p.q * find_support(*shape, p.q.conjugate() * -up).point);
-          p.x = on_seam - below - depth * scale * up;
-          const Vec3 whole = search(p, bent(angle, 1, turn, 17)).force,
-                     cut = search(p, bent(angle, 7, turn, digits), 1e-4 * scale).force;
-          EXPECT_LT((cut - whole).norm(), (digits > 16 ? 1e-6 : 0.05) * whole.norm())
+          const double off = k % 2 ? random.sign() * random.log_uniform(1e-12, 1e-5) : 0;
+          const OnSeam force(*shape, angle, digits, off, random);
+          EXPECT_LT((force.cut - force.whole).norm(), (digits > 16 ? 1e-6 : 0.05) * force.whole.norm())
               << angle << " " << digits << " " << off;
         }
-}
-
-// A corner of a box near the line of a ridge, which is as many lines as there are strips: it may count for
-// both faces where they are equally far, and for no more. One whose vertices were taken for tips gave it all
-// the box's size.
-TEST(SurfaceSearch, CornersOnSeamsOfFewDigits) {
-  Random random(13);
-  constexpr double scale = 0.1, depth = 1e-3;
-  const test::ShapePointer shape = test::cuboid();
-  for (const double angle : {0.1, -0.1, 0.8, -0.8, 1.5, -1.5})
-    for (const int digits : {17, 6})
-      for (int k = 0; k < 150; ++k) {
-        const Mat3 turn = random.turn().toRotationMatrix();
-        Particle p;
-        p.shape = shape.get();
-        p.scale = scale;
-        p.q = random.turn();
-        const Vec3 up = turn * Vec3(std::sin(angle / 2), 0, std::cos(angle / 2));
-        const Vec3 near_seam =
-            turn * Vec3(random.sign() * random.log_uniform(1e-12, 1e-3), random.uniform(-0.7, 0.7), 0);
-        const Vec3 below = scale * (p.q * find_support(*shape, p.q.conjugate() * -up).point);
-        p.x = near_seam - below - depth * scale * up;
-        const double whole = search(p, bent(angle, 1, turn, 17)).force.norm(),
-                     cut = search(p, bent(angle, 7, turn, digits), 1e-4 * scale).force.norm();
-        EXPECT_LE(cut, 2.5 * whole) << angle << " " << digits << " " << k;
-        EXPECT_GE(cut, 0.4 * whole) << angle << " " << digits << " " << k;
-      }
 }
 
 // So do cracks along a row of corners, up to where they are told from none.
@@ -351,6 +332,22 @@ TEST(SurfaceSearch, NarrowCracksAreNone) {
   EXPECT_NEAR(force(2e-4), 0.02, 1e-4);  // two borders, both of which the body meets
 }
 
+// A corner of a box near the line of a ridge, which is as many lines as there are strips: it may count for
+// both faces where they are equally far, and for no more. One whose vertices were taken for tips gave it all
+// the box's size.
+TEST(SurfaceSearch, CornersOnSeamsOfFewDigits) {
+  Random random(13);
+  for (const double angle : {0.1, -0.1, 0.8, -0.8, 1.5, -1.5})
+    for (const int digits : {17, 6})
+      for (int k = 0; k < 150; ++k) {
+        const double off = random.sign() * random.log_uniform(1e-12, 1e-3);
+        const OnSeam force(*test::cuboid(), angle, digits, off, random);
+        EXPECT_LE(force.cut.norm(), 2.5 * force.whole.norm()) << angle << " " << digits << " " << k;
+        EXPECT_GE(force.cut.norm(), 0.4 * force.whole.norm()) << angle << " " << digits << " " << k;
+      }
+}
+
+// As where two meshes have a plate in common, each with its own side of it.
 TEST(SurfaceSearch, TrianglesThatAreThereTwiceCountOnce) {
   Random random(11);
   for (const auto& shape : bodies())

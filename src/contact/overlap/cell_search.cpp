@@ -275,7 +275,7 @@ class CellSearch {
     // Where they are level is a line but to second order: in a strip along it that holds it, their mean that
     // is level across it.
     double share;
-    if (least >= enough || !level_across(p, q, across, &share)) return least;
+    if (least >= enough || !CellSearch::level(p, q, &share)) return least;
     const Mat2 differ = (q.bend - p.bend) - (q.y - p.y) * Mat2::Identity();
     const double strip = differ.norm() * r * r / steep;
     const double from = std::max(-r, level - strip), to = std::min(r, level + strip);
@@ -289,13 +289,6 @@ class CellSearch {
     if (to < r) take(least_in_box(q, across, to, r, r, &other) - left_q, other);
     if (better > least) *where = at;
     return std::max(least, better);
-  }
-
-  // The mean of two that has no slope across the line on which they are level, if it is between them.
-  static bool level_across(const Mean& p, const Mean& q, const Vec2& across, double* share) {
-    const double sp = p.slope.dot(across), sq = q.slope.dot(across);
-    *share = -sp / (sq - sp);
-    return sp < 0 && sq > 0;
   }
 
   // The best bound that the pieces give, alone, by two, and, where three are level, by their means.

@@ -17,39 +17,44 @@ bool SurfaceSearch::finds_sharp(double gap) const {
   return edged(shape) || -gap > kBluntest * particle_.scale * shape.curvature.min_radius;
 }
 
+// The ways from a vertex along its edges and, where another triangle's side goes straight on through it, into
+// that, square to the side.
+const std::vector<Vec3>& SurfaceSearch::ways_from(int number) const {
+  const MeshPatch::Vertex& v = patch_.vertices()[number];
+  std::vector<Vec3>& ways = workspace().ways;
+  ways.clear();
+  for (int i = 0; i < v.edges; ++i) {
+    const MeshPatch::Edge& e = patch_.edges()[patch_.edge_at(v.first_edge + i)];
+    ways.push_back(away(e, number) * e.direction);
+  }
+  for (int i = 0; i < v.cells; ++i) {
+    const MeshPatch::Cell& cell = patch_.cells()[patch_.cell_at(v.first_cell + i)];
+    for (int k = cell.first; cell.corners > 3 && k < cell.first + cell.corners; ++k)
+      if (patch_.corner(k) == number && patch_.splits_side(k))
+        ways.push_back(patch_.sign_of(k) *
+                       patch_.planes()[cell.plane].normal.cross(patch_.edges()[patch_.edge_of(k)].direction));
+  }
+  return ways;
+}
+
 SurfaceSearch::Cone SurfaceSearch::cone_at(int number) const {
   const MeshPatch::Vertex& v = patch_.vertices()[number];
+  for (int k = 0; k < v.edges; ++k)
+    if (patch_.edges()[patch_.edge_at(v.first_edge + k)].sides != 2) return Cone::other;
+  const std::vector<Vec3>& ways = ways_from(number);
   bool outside = false;
   for (int i = 0; i < v.cells; ++i) {
     const Vec3& n = patch_.planes()[patch_.cells()[patch_.cell_at(v.first_cell + i)].plane].normal;
     double low = 0, high = 0;
-    for (int k = 0; k < v.edges; ++k) {
-      const MeshPatch::Edge& e = patch_.edges()[patch_.edge_at(v.first_edge + k)];
-      if (e.sides != 2) return Cone::other;
-      const double height = away(e, number) * n.dot(e.direction);
-      low = std::min(low, height);
-      high = std::max(high, height);
-    }
-    for (int k = 0; k < v.cells; ++k) {  // of a side that goes straight on here, into its cell
-      const double height = n.dot(into_split(patch_.cell_at(v.first_cell + k), number));
-      low = std::min(low, height);
-      high = std::max(high, height);
+    for (const Vec3& way : ways) {
+      low = std::min(low, n.dot(way));
+      high = std::max(high, n.dot(way));
     }
     if (std::min(-low, high) > kOneSide) return Cone::other;
     const double off = n.dot(particle_.x - v.x);
     outside = outside || (high > -low ? off < 0 : off > 0);
   }
   return outside ? Cone::outside : Cone::around;
-}
-
-// From a vertex within a side of a cell into that, square to the side; zero of its corners.
-Vec3 SurfaceSearch::into_split(int number, int vertex) const {
-  const MeshPatch::Cell& cell = patch_.cells()[number];
-  for (int k = cell.first; cell.corners > 3 && k < cell.first + cell.corners; ++k)
-    if (patch_.corner(k) == vertex && patch_.splits_side(k))
-      return patch_.sign_of(k) *
-             patch_.planes()[cell.plane].normal.cross(patch_.edges()[patch_.edge_of(k)].direction);
-  return Vec3::Zero();
 }
 
 // The normals of the wall at an edge that stands out towards the body: from one face's to the other's,
@@ -308,18 +313,9 @@ bool SurfaceSearch::touch_outer_vertex(int number, const Vec3& guess) {
   int count = 0;
   bool touched = false;
   double most = -kFarAway;
-  std::vector<Vec3>& edges = workspace().ways;
-  edges.clear();
-  for (int i = 0; i < v.edges; ++i) {
-    const MeshPatch::Edge& e = patch_.edges()[patch_.edge_at(v.first_edge + i)];
-    edges.push_back(away(e, number) * e.direction);
-  }
-  for (int i = 0; i < v.cells; ++i) {
-    const Vec3 in = into_split(patch_.cell_at(v.first_cell + i), number);
-    if (in.squaredNorm() > 0) edges.push_back(in);
-  }
+  const std::vector<Vec3>& ways = ways_from(number);
   const auto is_normal = [&](const Vec3& d) {
-    return std::all_of(edges.begin(), edges.end(), [&](const Vec3& e) { return e.dot(d) <= kOneSide; });
+    return std::all_of(ways.begin(), ways.end(), [&](const Vec3& e) { return e.dot(d) <= kOneSide; });
   };
   const auto offer = [&](int contact) {
     const SurfaceContact* c = kept(contact);
@@ -344,13 +340,13 @@ bool SurfaceSearch::touch_outer_vertex(int number, const Vec3& guess) {
   FeatureContact f;
   bool own = find_only_way_out(particle_, v.x, guess, from, &f);
   if (!own || (!f.touching && !is_normal(f.normal))) {
-    f = find_highest_point_contact(particle_, v.x, edges.data(), static_cast<int>(edges.size()), most, from);
+    f = find_highest_point_contact(particle_, v.x, ways.data(), static_cast<int>(ways.size()), most, from);
     // Where f is highest at the border of the normals and goes on to rise, an edge has the contact.
     const auto goes_on = [&](const Vec3& e) {
       return e.dot(f.normal) > -kBorder &&
              gap_along(particle_, v.x, (f.normal + 10 * kBorder * e).normalized(), &f.where).gap > f.gap;
     };
-    own = f.touching && f.gap > most && std::none_of(edges.begin(), edges.end(), goes_on) && meets(v);
+    own = f.touching && f.gap > most && std::none_of(ways.begin(), ways.end(), goes_on) && meets(v);
   }
   if (!f.touching) most = kFarAway;  // nor are its pieces, where a normal parts the body from all of them
   int best = -1;

@@ -57,7 +57,7 @@ struct Workspace {
   std::vector<MetEdge> edges;
   std::vector<int> active;
   std::vector<Stretch> line;
-  std::vector<Vec3> corners, ways;  // ways: of the edges at a vertex
+  std::vector<Vec3> corners, ways;  // ways: that lead away from a vertex
 };
 Workspace& workspace();
 
@@ -138,8 +138,8 @@ class SurfaceSearch {
 
   // Edges and vertices that stand out.
   bool finds_sharp(double gap) const;
+  const std::vector<Vec3>& ways_from(int number) const;
   Cone cone_at(int number) const;
-  Vec3 into_split(int number, int vertex) const;
   bool outer_arc(const MeshPatch::Edge& e, Arc* arc) const;
   int plane_of(const MeshPatch::Edge& e, int side) const;
   const SurfaceContact* kept(int contact) const;
