@@ -9,7 +9,7 @@
 #include "support/random.h"
 #include "support/solids.h"
 
-namespace nurbs {
+namespace nurbs::test_cell_search {
 namespace {
 
 using test::Random;
@@ -58,4 +58,4 @@ TEST(CellSearch, finds_the_least_overlap_from_any_direction) {
 }
 
 }  // namespace
-}  // namespace nurbs
+}  // namespace nurbs::test_cell_search

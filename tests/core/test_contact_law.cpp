@@ -8,9 +8,8 @@
 #include "laws/contact_law.h"
 #include "motion/rotation.h"
 
+namespace nurbs::test_contact_law {
 namespace {
-
-using namespace nurbs;
 
 struct Body {
   Vec3 x = Vec3::Zero(), v = Vec3::Zero(), momentum = Vec3::Zero();
@@ -360,3 +359,4 @@ TEST(ContactLaw, resolved_step_names_the_stricter_of_stiffness_and_damping) {
 }
 
 }  // namespace
+}  // namespace nurbs::test_contact_law

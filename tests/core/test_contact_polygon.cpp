@@ -13,10 +13,10 @@
 #include "support/flat_bodies.h"
 #include "support/random.h"
 
+namespace nurbs::test_contact_polygon {
 namespace {
 
-using namespace nurbs;
-using namespace nurbs::test;
+using namespace test;
 
 ShapePointer roller() {
   static const ShapePointer s = make_shape("cylinder", cylinder(0.7, 1.5));
@@ -719,3 +719,4 @@ TEST(ContactPolygon, is_plain_data) {
 }
 
 }  // namespace
+}  // namespace nurbs::test_contact_polygon

@@ -7,7 +7,7 @@
 #include "shapes/convex_hull.h"
 #include "support/random.h"
 
-namespace nurbs {
+namespace nurbs::test_convex_hull {
 namespace {
 
 using test::Random;
@@ -69,4 +69,4 @@ TEST(ConvexHull, its_image_is_the_hull_of_the_points_images) {
 }
 
 }  // namespace
-}  // namespace nurbs
+}  // namespace nurbs::test_convex_hull

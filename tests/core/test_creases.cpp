@@ -14,7 +14,7 @@
 #include "support/pairs.h"
 #include "support/random.h"
 
-namespace nurbs {
+namespace nurbs::test_creases {
 namespace {
 
 using namespace test;
@@ -144,4 +144,4 @@ TEST(Creases, contacts_over_dents_are_followed) {
 }
 
 }  // namespace
-}  // namespace nurbs
+}  // namespace nurbs::test_creases

@@ -14,7 +14,7 @@
 #include "support/allocations.h"
 #include "support/random.h"
 
-namespace nurbs {
+namespace nurbs::test_cso {
 namespace {
 
 test::Random& random_numbers() {
@@ -440,4 +440,4 @@ TEST(Cso, BodiesOutsideTheMethodEndHonestly) {
 }
 
 }  // namespace
-}  // namespace nurbs
+}  // namespace nurbs::test_cso

@@ -13,10 +13,10 @@
 #include "support/random.h"
 #include "support/solids.h"
 
+namespace nurbs::test_cylinder_search {
 namespace {
 
-using namespace nurbs;
-using namespace nurbs::test;
+using namespace test;
 
 constexpr int kAround = 2048;  // directions sampled
 constexpr double kPath = 5;    // that the body has gone
@@ -486,3 +486,4 @@ TEST(CylinderSearch, contacts_in_a_tube_are_met_again_where_they_were_left) {
 }
 
 }  // namespace
+}  // namespace nurbs::test_cylinder_search

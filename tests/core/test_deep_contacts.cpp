@@ -15,7 +15,7 @@
 #include "support/cases.h"
 #include "support/pairs.h"
 
-namespace nurbs {
+namespace nurbs::test_deep_contacts {
 namespace {
 
 using namespace test;
@@ -182,4 +182,4 @@ TEST(DeepContacts, AnApexOverAFaceIsTouchedThere) {
 }
 
 }  // namespace
-}  // namespace nurbs
+}  // namespace nurbs::test_deep_contacts

@@ -18,7 +18,7 @@
 #include "support/bodies.h"
 #include "support/pairs.h"
 
-namespace nurbs {
+namespace nurbs::test_deep_search {
 namespace {
 
 using namespace test;
@@ -408,4 +408,4 @@ TEST(DeepProof, outlives_steps_and_never_the_minimum) {
 }
 
 }  // namespace
-}  // namespace nurbs
+}  // namespace nurbs::test_deep_search

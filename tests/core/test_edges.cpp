@@ -16,7 +16,7 @@
 #include "support/random.h"
 #include "support/solids.h"
 
-namespace nurbs {
+namespace nurbs::test_edges {
 namespace {
 
 using namespace test;
@@ -257,4 +257,4 @@ TEST(Edges, two_rims_that_cross) {
 }
 
 }  // namespace
-}  // namespace nurbs
+}  // namespace nurbs::test_edges

@@ -8,7 +8,7 @@
 #include "support/bodies.h"
 #include "support/random.h"
 
-namespace nurbs {
+namespace nurbs::test_effective_radius {
 namespace {
 
 using test::Random;
@@ -138,4 +138,4 @@ TEST(EffectiveRadius, FlatFacesCreasesAndCylinders) {
 }
 
 }  // namespace
-}  // namespace nurbs
+}  // namespace nurbs::test_effective_radius

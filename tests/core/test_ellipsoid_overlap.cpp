@@ -14,7 +14,7 @@
 #include "support/least_overlap.h"
 #include "support/pairs.h"
 
-namespace nurbs {
+namespace nurbs::test_ellipsoid_overlap {
 namespace {
 
 using test::Random;
@@ -196,4 +196,4 @@ TEST(EllipsoidOverlap, a_capsule_in_an_ellipsoid) {
 }
 
 }  // namespace
-}  // namespace nurbs
+}  // namespace nurbs::test_ellipsoid_overlap

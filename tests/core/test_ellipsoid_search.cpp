@@ -14,7 +14,7 @@
 #include "support/ellipsoid_oracle.h"
 #include "support/pairs.h"
 
-namespace nurbs {
+namespace nurbs::test_ellipsoid_search {
 namespace {
 
 using test::as_surface;
@@ -204,4 +204,4 @@ TEST(EllipsoidSearch, hands_on_what_it_cannot_prove) {
 }
 
 }  // namespace
-}  // namespace nurbs
+}  // namespace nurbs::test_ellipsoid_search

@@ -14,7 +14,7 @@
 #include "support/pairs.h"
 #include "support/solids.h"
 
-namespace nurbs {
+namespace nurbs::test_few_digits {
 namespace {
 
 using test::Random;
@@ -145,4 +145,4 @@ TEST(FewDigits, small_fillets_are_accepted) {
 }
 
 }  // namespace
-}  // namespace nurbs
+}  // namespace nurbs::test_few_digits

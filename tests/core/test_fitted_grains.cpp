@@ -8,7 +8,7 @@
 #include "shapes/rounded_polyhedron.h"
 #include "support/pairs.h"
 
-namespace nurbs {
+namespace nurbs::test_fitted_grains {
 namespace {
 
 using test::Random;
@@ -112,4 +112,4 @@ TEST_F(FittedGrains, tumble_in_contact) {
 }
 
 }  // namespace
-}  // namespace nurbs
+}  // namespace nurbs::test_fitted_grains

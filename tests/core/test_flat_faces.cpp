@@ -15,10 +15,10 @@
 #include "support/random.h"
 #include "support/solids.h"
 
+namespace nurbs::test_flat_faces {
 namespace {
 
-using namespace nurbs;
-using namespace nurbs::test;
+using namespace test;
 
 // The body turned at random, so that nothing is aligned with an axis.
 ShapePointer turned(const std::string& name, std::vector<NurbsSurface> body, const Quat& q) {
@@ -377,3 +377,4 @@ TEST(FlatFaces, creases_beside_the_support_are_none) {
 }
 
 }  // namespace
+}  // namespace nurbs::test_flat_faces

@@ -14,10 +14,10 @@
 #include "support/flat_bodies.h"
 #include "support/random.h"
 
+namespace nurbs::test_flat_search {
 namespace {
 
-using namespace nurbs;
-using namespace nurbs::test;
+using namespace test;
 
 struct Polyhedron {
   ShapePointer shape;
@@ -169,3 +169,4 @@ TEST(FlatSearch, contacts_that_go_on_are_served) {
 }
 
 }  // namespace
+}  // namespace nurbs::test_flat_search

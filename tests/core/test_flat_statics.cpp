@@ -14,10 +14,10 @@
 #include "support/flat_bodies.h"
 #include "support/random.h"
 
+namespace nurbs::test_flat_statics {
 namespace {
 
-using namespace nurbs;
-using namespace nurbs::test;
+using namespace test;
 
 constexpr double kRelaxation = 0.6;  // some periods of a contact
 
@@ -423,3 +423,4 @@ TEST(FlatStatics, frictionless_rocking_keeps_the_energy) {
 }
 
 }  // namespace
+}  // namespace nurbs::test_flat_statics

@@ -12,7 +12,7 @@
 #include "support/random.h"
 #include "support/reference.h"
 
-namespace nurbs {
+namespace nurbs::test_force {
 namespace {
 
 using namespace test;
@@ -100,4 +100,4 @@ TEST_P(Forces, are_right_to_the_tolerance_on_every_rung) {
 INSTANTIATE_TEST_SUITE_P(Tolerances, Forces, testing::Values(1e-4, 1e-6, 1e-9));
 
 }  // namespace
-}  // namespace nurbs
+}  // namespace nurbs::test_force

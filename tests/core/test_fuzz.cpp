@@ -26,7 +26,7 @@
 #include "support/bodies.h"
 #include "support/solid_families.h"
 
-namespace nurbs {
+namespace nurbs::test_fuzz {
 namespace {
 
 using families::Failure;
@@ -550,4 +550,4 @@ TEST(FuzzFiles, huge_counts_and_deep_nesting) {
 }
 
 }  // namespace
-}  // namespace nurbs
+}  // namespace nurbs::test_fuzz

@@ -7,7 +7,7 @@
 #include "shapes/hull_fit.h"
 #include "support/random.h"
 
-namespace nurbs {
+namespace nurbs::test_gauge_fit {
 namespace {
 
 using test::Random;
@@ -59,4 +59,4 @@ TEST(GaugeFit, goes_as_far_as_it_can_towards_one_that_can_not) {
 }
 
 }  // namespace
-}  // namespace nurbs
+}  // namespace nurbs::test_gauge_fit

@@ -10,7 +10,7 @@
 #include "contact/overlap/growing_hull.h"
 #include "support/random.h"
 
-namespace nurbs {
+namespace nurbs::test_growing_hull {
 namespace {
 
 using test::Random;
@@ -213,4 +213,4 @@ TEST(GrowingHull, origin_outside_is_as_far_as_the_nearest_triangle) {
 }
 
 }  // namespace
-}  // namespace nurbs
+}  // namespace nurbs::test_growing_hull

@@ -8,7 +8,7 @@
 #include "nurbs/tolerances.h"
 #include "support/random.h"
 
-namespace nurbs {
+namespace nurbs::test_half_plane_hull {
 namespace {
 
 using test::Random;
@@ -100,4 +100,4 @@ TEST(HalfPlaneHull, of_one_point_the_least_is_at_an_end) {
 }
 
 }  // namespace
-}  // namespace nurbs
+}  // namespace nurbs::test_half_plane_hull

@@ -13,7 +13,7 @@
 #include "support/flat_bodies.h"
 #include "support/random.h"
 
-namespace nurbs {
+namespace nurbs::test_hull_point {
 namespace {
 
 using test::Random;
@@ -122,4 +122,4 @@ TEST(HullPoints, turn_as_their_differences_do) {
 }
 
 }  // namespace
-}  // namespace nurbs
+}  // namespace nurbs::test_hull_point

@@ -6,7 +6,7 @@
 #include "support/bodies.h"
 #include "support/random.h"
 
-namespace nurbs {
+namespace nurbs::test_insertion_site {
 namespace {
 
 using namespace test;
@@ -104,4 +104,4 @@ TEST(InsertionSite, holds_a_body_thousands_of_times_as_large) {
 }
 
 }  // namespace
-}  // namespace nurbs
+}  // namespace nurbs::test_insertion_site

@@ -11,7 +11,7 @@
 #include "support/bodies.h"
 #include "support/pairs.h"
 
-namespace nurbs {
+namespace nurbs::test_ladder {
 namespace {
 
 using namespace test;
@@ -229,4 +229,4 @@ TEST(Plane, loose_brackets_hold_the_gap) {
 }
 
 }  // namespace
-}  // namespace nurbs
+}  // namespace nurbs::test_ladder

@@ -12,7 +12,7 @@
 #include "support/bodies.h"
 #include "support/random.h"
 
-namespace nurbs {
+namespace nurbs::test_local_bend {
 namespace {
 
 using test::Random;
@@ -78,4 +78,4 @@ TEST(LocalBend, a_quadratic_stays_above_zero_only_if_it_does) {
 }
 
 }  // namespace
-}  // namespace nurbs
+}  // namespace nurbs::test_local_bend

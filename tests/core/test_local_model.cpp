@@ -6,7 +6,7 @@
 #include "support/as_surface.h"
 #include "support/random.h"
 
-namespace nurbs {
+namespace nurbs::test_local_model {
 namespace {
 
 ContactSettings settings(double tolerance) {
@@ -95,4 +95,4 @@ TEST(LocalModel, BracketHoldsTheTrueGap) {
 }
 
 }  // namespace
-}  // namespace nurbs
+}  // namespace nurbs::test_local_model

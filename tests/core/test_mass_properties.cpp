@@ -8,7 +8,7 @@
 #include "shapes/primitives.h"
 #include "support/random.h"
 
-namespace nurbs {
+namespace nurbs::test_mass_properties {
 namespace {
 
 using test::Random;
@@ -144,4 +144,4 @@ TEST(PrincipalFrame, DiagonalTensorKeepsItsAxes) {
 }
 
 }  // namespace
-}  // namespace nurbs
+}  // namespace nurbs::test_mass_properties

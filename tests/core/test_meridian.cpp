@@ -17,7 +17,7 @@
 #include "support/random.h"
 #include "support/solids.h"
 
-namespace nurbs {
+namespace nurbs::test_meridian {
 namespace {
 
 using test::Random;
@@ -351,4 +351,4 @@ TEST(ProfileRadii, are_zero_at_kinks) {
 }
 
 }  // namespace
-}  // namespace nurbs
+}  // namespace nurbs::test_meridian

@@ -17,7 +17,7 @@
 #include "support/random.h"
 #include "support/solids.h"
 
-namespace nurbs {
+namespace nurbs::test_near_ball {
 namespace {
 
 using test::Random;
@@ -260,4 +260,4 @@ TEST(NearBall, points_are_on_the_bodies) {
 }
 
 }  // namespace
-}  // namespace nurbs
+}  // namespace nurbs::test_near_ball

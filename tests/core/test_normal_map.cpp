@@ -9,7 +9,7 @@
 #include "support/hidden_dents.h"
 #include "support/random.h"
 
-namespace nurbs {
+namespace nurbs::test_normal_map {
 namespace {
 
 using namespace test;
@@ -268,4 +268,4 @@ TEST(DentedParts, are_those_of_dents) {
 }
 
 }  // namespace
-}  // namespace nurbs
+}  // namespace nurbs::test_normal_map

@@ -7,7 +7,7 @@
 #include "nurbs/nurbs_surface.h"
 #include "support/random.h"
 
-namespace nurbs {
+namespace nurbs::test_nurbs_surface {
 namespace {
 
 using test::Random;
@@ -199,4 +199,4 @@ TEST(NurbsSurface, KnotMultiplicityIsLimited) {
 }
 
 }  // namespace
-}  // namespace nurbs
+}  // namespace nurbs::test_nurbs_surface

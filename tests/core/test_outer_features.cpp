@@ -19,7 +19,7 @@
 #include "support/random.h"
 #include "support/solids.h"
 
-namespace nurbs {
+namespace nurbs::test_outer_features {
 namespace {
 
 using test::Random;
@@ -268,4 +268,4 @@ TEST(OuterFeatures, valleys_that_a_corner_pokes_through) {
 }
 
 }  // namespace
-}  // namespace nurbs
+}  // namespace nurbs::test_outer_features

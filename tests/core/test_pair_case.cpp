@@ -10,7 +10,7 @@
 #include "support/bodies.h"
 #include "support/pairs.h"
 
-namespace nurbs {
+namespace nurbs::test_pair_case {
 namespace {
 
 using namespace test;
@@ -61,4 +61,4 @@ TEST(PairCase, says_what_is_wrong_with_a_file) {
 }
 
 }  // namespace
-}  // namespace nurbs
+}  // namespace nurbs::test_pair_case

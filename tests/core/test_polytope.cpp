@@ -6,7 +6,7 @@
 #include "support/bodies.h"
 #include "support/pairs.h"
 
-namespace nurbs {
+namespace nurbs::test_polytope {
 namespace {
 
 using namespace test;
@@ -128,4 +128,4 @@ TEST(Polytope, concentric_boxes_of_one_turn) {
 }
 
 }  // namespace
-}  // namespace nurbs
+}  // namespace nurbs::test_polytope

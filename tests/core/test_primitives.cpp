@@ -16,7 +16,7 @@
 #include "shapes/superellipsoid.h"
 #include "support/random.h"
 
-namespace nurbs {
+namespace nurbs::test_primitives {
 namespace {
 
 using Surfaces = std::vector<NurbsSurface>;
@@ -422,4 +422,4 @@ TEST(RoundedProfile, of_a_cylinder_is_a_tablet) {
 }
 
 }  // namespace
-}  // namespace nurbs
+}  // namespace nurbs::test_primitives

@@ -25,7 +25,7 @@
 #include "support/cases.h"
 #include "support/random.h"
 
-namespace nurbs {
+namespace nurbs::test_proofs {
 namespace {
 
 using namespace test;
@@ -725,4 +725,4 @@ TEST(Dents, of_turned_bodies_are_not_overlooked) {
 }
 
 }  // namespace
-}  // namespace nurbs
+}  // namespace nurbs::test_proofs

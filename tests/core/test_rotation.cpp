@@ -12,7 +12,7 @@
 #include "motion/rotation.h"
 #include "support/random.h"
 
-namespace nurbs {
+namespace nurbs::test_rotation {
 namespace {
 
 using test::Random;
@@ -378,4 +378,4 @@ TEST(Schemes, MomentumVelocityAndFramesAgree) {
 }
 
 }  // namespace
-}  // namespace nurbs
+}  // namespace nurbs::test_rotation

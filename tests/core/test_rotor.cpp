@@ -12,7 +12,7 @@
 #include "motion/rotor.h"
 #include "motion/rotor_kernel.h"
 
-namespace nurbs {
+namespace nurbs::test_rotor {
 namespace {
 
 const double kEps = std::numeric_limits<double>::epsilon();
@@ -222,4 +222,4 @@ TEST(Rotor, MakesAQuaternionUnitThatIsNot) {
 }
 
 }  // namespace
-}  // namespace nurbs
+}  // namespace nurbs::test_rotor

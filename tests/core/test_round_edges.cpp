@@ -9,7 +9,7 @@
 #include "support/random.h"
 #include "support/solids.h"
 
-namespace nurbs {
+namespace nurbs::test_round_edges {
 namespace {
 
 using test::Random;
@@ -94,4 +94,4 @@ TEST(RoundEdges, an_arc_holds_what_lies_within_its_ends) {
 }
 
 }  // namespace
-}  // namespace nurbs
+}  // namespace nurbs::test_round_edges

@@ -8,7 +8,7 @@
 #include "shapes/rounded_polyhedron.h"
 #include "support/random.h"
 
-namespace nurbs {
+namespace nurbs::test_rounded_polyhedra {
 namespace {
 
 using test::Random;
@@ -101,4 +101,4 @@ TEST(RoundedPolyhedra, corners_are_as_far_as_they_are) {
 }
 
 }  // namespace
-}  // namespace nurbs
+}  // namespace nurbs::test_rounded_polyhedra

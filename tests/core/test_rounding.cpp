@@ -13,7 +13,7 @@
 #include "support/bodies.h"
 #include "support/random.h"
 
-namespace nurbs {
+namespace nurbs::test_rounding {
 namespace {
 
 double rounding_of(std::vector<NurbsSurface> surfaces) {
@@ -115,4 +115,4 @@ TEST(Rounding, of_small_patches_on_balls_allows_for_what_round_off_may_bend) {
 }
 
 }  // namespace
-}  // namespace nurbs
+}  // namespace nurbs::test_rounding

@@ -9,7 +9,7 @@
 #include "support/host_bodies.h"
 #include "support/random.h"
 
-namespace nurbs {
+namespace nurbs::test_scene {
 namespace {
 
 using test::Random;
@@ -272,4 +272,4 @@ TEST(Stages, wall_forces_are_right_to_the_tolerance) {
 }
 
 }  // namespace
-}  // namespace nurbs
+}  // namespace nurbs::test_scene

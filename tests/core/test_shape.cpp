@@ -13,7 +13,7 @@
 #include "shapes/revolved.h"
 #include "support/random.h"
 
-namespace nurbs {
+namespace nurbs::test_shape {
 namespace {
 
 using test::Random;
@@ -610,4 +610,4 @@ TEST(Gyration, ImpossibleTensorsAreRefused) {
 }
 
 }  // namespace
-}  // namespace nurbs
+}  // namespace nurbs::test_shape

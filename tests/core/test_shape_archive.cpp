@@ -9,7 +9,7 @@
 #include "support/bodies.h"
 #include "support/flat_bodies.h"
 
-namespace nurbs {
+namespace nurbs::test_shape_archive {
 namespace {
 
 // Round, dented, with poles, flat faces, rulings, a meridian: every table of a shape is filled in one of
@@ -96,4 +96,4 @@ TEST(ShapeArchive, DamagedBytesAreRefused) {
 }
 
 }  // namespace
-}  // namespace nurbs
+}  // namespace nurbs::test_shape_archive

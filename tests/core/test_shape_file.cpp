@@ -13,7 +13,7 @@
 #include "support/random.h"
 #include "support/solids.h"
 
-namespace nurbs {
+namespace nurbs::test_shape_file {
 namespace {
 
 using Json = nlohmann::json;
@@ -355,4 +355,4 @@ TEST(ShapeFileErrors, WrongTypesAnywhereGiveOneLineOrAShape) {
 }
 
 }  // namespace
-}  // namespace nurbs
+}  // namespace nurbs::test_shape_file

@@ -12,7 +12,7 @@
 #include "support/random.h"
 #include "support/solids.h"
 
-namespace nurbs {
+namespace nurbs::test_small_kinks {
 namespace {
 
 using test::Random;
@@ -129,4 +129,4 @@ TEST(SmallKinks, count_by_a_smaller_mates_size) {
 }
 
 }  // namespace
-}  // namespace nurbs
+}  // namespace nurbs::test_small_kinks

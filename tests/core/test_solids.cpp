@@ -20,7 +20,7 @@
 #include "support/pairs.h"
 #include "support/solid_families.h"
 
-namespace nurbs {
+namespace nurbs::test_solids {
 namespace {
 
 using families::Kind;
@@ -793,4 +793,4 @@ TEST(SavedCases, drifted_quaternions_do_no_harm) {
 }
 
 }  // namespace
-}  // namespace nurbs
+}  // namespace nurbs::test_solids

@@ -19,7 +19,7 @@
 #include "support/ellipsoid_oracle.h"
 #include "support/random.h"
 
-namespace nurbs {
+namespace nurbs::test_solvers_agree {
 namespace {
 
 constexpr double kAgreement = 1e-9;  // of the smaller bounding radius
@@ -281,4 +281,4 @@ TEST(ClosedForms, EllipsoidsAgainstTheOracleInBothSolvers) {
 }
 
 }  // namespace
-}  // namespace nurbs
+}  // namespace nurbs::test_solvers_agree

@@ -8,7 +8,7 @@
 #include "shapes/primitives.h"
 #include "support/pairs.h"
 
-namespace nurbs {
+namespace nurbs::test_sphere_search {
 namespace {
 
 using test::Random;
@@ -161,4 +161,4 @@ TEST(SphereSearch, concentric) {
 }
 
 }  // namespace
-}  // namespace nurbs
+}  // namespace nurbs::test_sphere_search

@@ -18,7 +18,7 @@
 #include "support/pairs.h"
 #include "support/random.h"
 
-namespace nurbs {
+namespace nurbs::test_sphero_polyhedron {
 namespace {
 
 using test::Random;
@@ -330,4 +330,4 @@ TEST(InnerBalls, contacts_about_one_centre_are_least_overlaps) {
 }
 
 }  // namespace
-}  // namespace nurbs
+}  // namespace nurbs::test_sphero_polyhedron

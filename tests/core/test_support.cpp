@@ -6,7 +6,7 @@
 #include "support/random.h"
 #include "support/solids.h"
 
-namespace nurbs {
+namespace nurbs::test_support {
 namespace {
 
 using namespace test;
@@ -185,4 +185,4 @@ TEST(Walk, carries_a_tangent_step_into_the_neighbour) {
 }
 
 }  // namespace
-}  // namespace nurbs
+}  // namespace nurbs::test_support

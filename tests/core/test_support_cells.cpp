@@ -14,7 +14,7 @@
 #include "support/random.h"
 #include "support/solids.h"
 
-namespace nurbs {
+namespace nurbs::test_support_cells {
 namespace {
 
 using namespace test;
@@ -194,4 +194,4 @@ TEST(PatchMaximum, of_a_piece_is_that_of_its_part_of_the_patch) {
 }
 
 }  // namespace
-}  // namespace nurbs
+}  // namespace nurbs::test_support_cells

@@ -13,7 +13,7 @@
 #include "support/bodies.h"
 #include "support/random.h"
 
-namespace nurbs {
+namespace nurbs::test_surface_search {
 namespace {
 
 using test::Random;
@@ -556,4 +556,4 @@ TEST(SurfaceSearch, RidgeValleyAndVertex) {
 }
 
 }  // namespace
-}  // namespace nurbs
+}  // namespace nurbs::test_surface_search

@@ -8,7 +8,7 @@
 #include "nurbs/bezier_patch.h"
 #include "support/random.h"
 
-namespace nurbs {
+namespace nurbs::test_vtk_bezier {
 namespace {
 
 // From vtkHigherOrderQuadrilateral::PointIndexFromIJK (VTK 9.1), rows i along u, columns j along v.
@@ -58,4 +58,4 @@ TEST(VtkBezierCell, holds_the_projected_control_points_and_weights) {
 }
 
 }  // namespace
-}  // namespace nurbs
+}  // namespace nurbs::test_vtk_bezier

@@ -8,7 +8,7 @@
 #include "laws/linear_law.h"
 #include "scene/contact_pool.h"
 
-namespace nurbs {
+namespace nurbs::test_wide {
 namespace {
 
 class Numbers {
@@ -190,4 +190,4 @@ TEST(Memory, is_what_is_promised) {
 }
 
 }  // namespace
-}  // namespace nurbs
+}  // namespace nurbs::test_wide

@@ -11,7 +11,7 @@
 #include "support/bodies.h"
 #include "support/pairs.h"
 
-namespace nurbs {
+namespace nurbs::test_widen_cap {
 namespace {
 
 using namespace test;
@@ -133,4 +133,4 @@ TEST(WidenCap, stops_where_the_overlap_comes_down_to_the_level) {
 }
 
 }  // namespace
-}  // namespace nurbs
+}  // namespace nurbs::test_widen_cap
