@@ -164,7 +164,8 @@ void orient_and_weigh(Draft& draft) {
     s.mass.inertia = -s.mass.inertia;
   }
   if (!(s.mass.volume > kLeastVolume * size * size * size)) {
-    throw ShapeError("the patches enclose no volume: " + number(s.mass.volume));
+    throw ShapeError("the patches enclose no volume, or too little beside their extent: " +
+                     number(s.mass.volume) + " in a box of diagonal " + number(size));
   }
   warn_of_turned(draft);
 }

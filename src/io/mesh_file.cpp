@@ -115,6 +115,9 @@ TriangleMesh read_binary_stl(const std::string& file, const std::string& text) {
   if (text.size() < 84 + 50 * count)
     fail(file, "binary STL of " + std::to_string(count) + " triangles ends after " +
                    std::to_string((text.size() - 84) / 50));
+  if (const size_t more = text.size() - 84 - 50 * count; more > 0 && more % 50 == 0)
+    fail(file, "binary STL of " + std::to_string(count) + " triangles, by its header, holds " +
+                   std::to_string(more / 50) + " more");
   TriangleMesh mesh;
   for (size_t k = 0; k < count; ++k) {
     Vec3 corner[3];
@@ -390,7 +393,7 @@ TriangleMesh read_mesh_file(const std::string& file) {
     fail(file, "ending '" + ending + "' is not known; a mesh is .stl, .obj or .ply");
   }
   if (mesh.triangles.empty()) fail(file, "holds no triangles");
-  return mesh;
+  return drop_unused(mesh);  // a stray vertex far away would make the body look small
 }
 
 }  // namespace nurbs

@@ -80,6 +80,15 @@ bool has_weights(const Json& net) {
   return net.contains("weights") && !net["weights"].is_null();
 }
 
+// A factor common to a patch's weights means nothing: a power of two that brings the largest near 1, where it
+// is so far from it that squares might leave the range of numbers.
+double weight_unit(const std::vector<double>& weights) {
+  constexpr int kFar = 64;
+  const double largest = *std::max_element(weights.begin(), weights.end());
+  const int power = largest > 0 ? std::ilogb(largest) : 0;
+  return std::abs(power) > kFar ? std::ldexp(1.0, -power) : 1;
+}
+
 std::vector<Vec4> parse_points(const Json& net, size_t expected, const Place& place) {
   const Json& points = array(net, "points", place);
   require_count(points.size(), expected, "points", "size_u * size_v", place);
@@ -89,14 +98,15 @@ std::vector<Vec4> parse_points(const Json& net, size_t expected, const Place& pl
     require_count(weights.size(), expected, "weights", "size_u * size_v", place);
   }
   std::vector<Vec4> out(expected);
+  const double unit = weight_unit(weights);
   for (size_t i = 0; i < expected; ++i) {
     const std::string name = "points[" + std::to_string(i) + "]";
     if (!points[i].is_array() || points[i].size() != 3) {
       place.fail(name + " = " + quote(points[i]) + ", must be 3 coordinates");
     }
-    const double w = weights[i];
-    if (!(w > 0))
+    if (!(weights[i] > 0))
       place.fail("weights[" + std::to_string(i) + "] = " + quote(net["weights"][i]) + ", must be > 0");
+    const double w = unit * weights[i];
     for (int c = 0; c < 3; ++c) {
       out[i][c] = w * finite_number(points[i][c], name + "[" + std::to_string(c) + "]", place);
     }
@@ -146,9 +156,13 @@ std::string position(const std::string& text, size_t byte) {
 }
 
 Json parse_json(const std::string& text, const Place& place) {
+  constexpr int kDeepest = 64;  // quotes and destructors go down by recursion
   if (text.find_first_not_of(" \t\r\n") == std::string::npos) place.fail("the file is empty");
   try {
-    return Json::parse(text);
+    return Json::parse(text, [&](int depth, Json::parse_event_t, const Json&) {
+      if (depth > kDeepest) place.fail("nested deeper than " + std::to_string(kDeepest) + " levels");
+      return true;
+    });
   } catch (const Json::parse_error& error) {
     const bool at_end = error.byte > text.size();
     place.fail("not valid JSON at " + position(text, error.byte) +

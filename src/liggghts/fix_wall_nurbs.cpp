@@ -33,7 +33,7 @@ namespace {
 
 constexpr int kPlaneArguments = 7;     // plane PX PY PZ NX NY NZ
 constexpr int kCylinderArguments = 5;  // cylinder x|y|z RADIUS C1 C2
-constexpr double kListFormat = 2;      // of restarts: counts on where ContactStages::pack_list changes
+constexpr double kListFormat = 3;      // of restarts: counts on where ContactStages::pack_list changes
 
 bool begins_law(const char* word) {
   for (const char* first : {"kn", "kt", "cn", "ct", "mu", "type", "model", "radius", "move"})
@@ -50,9 +50,11 @@ FixWallNurbs::FixWallNurbs(LAMMPS* lmp, int narg, char** arg) : Fix(lmp, narg, a
     fail_all(FLERR, lmp,
              "Fix wall/nurbs: kind of wall " + (kind.empty() ? "is missing;" : kind) +
                  " must be plane, cylinder or mesh" +
-                 (kind == "primitive" ? "; for primitive type T zplane C write plane 0 0 C 0 0 1 type T, for "
-                                        "zcylinder R C1 C2 write cylinder z R C1 C2 type T"
-                                      : ""));
+                 (kind == "primitive"
+                      ? "; for primitive type T zplane C write plane 0 0 C 0 0 1 type T, for "
+                        "zcylinder R C1 C2 write cylinder z R C1 C2 type T, for ycylinder R C1 C2 cylinder y "
+                        "R C2 C1 type T"
+                      : ""));
   const int first = kind == "plane"      ? parse_plane(narg, arg)
                     : kind == "cylinder" ? parse_cylinder(narg, arg)
                                          : parse_mesh(narg, arg);

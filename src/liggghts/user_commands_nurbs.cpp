@@ -81,6 +81,7 @@ void SetNurbs::command(int narg, char** arg) {
     std::vector<char*> words = {arg[0], arg[1]};
     words.insert(words.end(), arg + first, arg + end);
     Set(lmp).command(static_cast<int>(words.size()), words.data());
+    bodies()->follow_set_commands();  // before ours make radius and mass of scale and density
   };
   if (bodies() == nullptr || domain->box_exist == 0 || atom->natoms == 0 || narg < 3)
     return Set(lmp).command(narg, arg);
@@ -114,7 +115,6 @@ void SetNurbs::command(int narg, char** arg) {
     done = k;
   }
   if (done < narg) host(done, narg);
-  bodies()->follow_set_commands();
 }
 
 // The host's command ends with particles on other ranks: first the turn.

@@ -270,7 +270,7 @@ class ContactStages {
     int mark = 0;
     bool seen = false;
     double body[3] = {};                // where the body was in the last step
-    double radius = 0;                  // of its bounding sphere, if it is known
+    std::uint64_t stamp = 0;            // the body's then, if it is known
     std::optional<PlaneRegion> region;  // of this step
     double path = 0;                    // of wall and body
     double normal[3] = {};              // of the face that the contact follows by itself, through record.x

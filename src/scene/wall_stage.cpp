@@ -10,7 +10,7 @@ namespace nurbs {
 namespace {
 
 constexpr double kSameSide = 0.7;             // cosine between normals: 45 degrees
-constexpr int kListedSize = 17 + kProofSize;  // doubles of a listed contact beside its record: see pack_list
+constexpr int kListedSize = 18 + kProofSize;  // doubles of a listed contact beside its record: see pack_list
 
 // The whole periods in a way; each has no component along the axes after its own.
 Vec3 periods_in(const Vec3 (&period)[3], Vec3 way) {
@@ -94,9 +94,9 @@ void ContactStages::update_listed(std::int32_t number, int body, const WallConta
   store(load(step_.bodies->record(body).x), p.body);
   bind_listed(number, body);
   if (step_.bodies->reshaped()) pool_.forget_way(number);
-  const double radius = step_.bodies->record(body).radius;
-  if (p.radius != 0 && p.radius != radius) forget_spheres(block, lane);
-  p.radius = radius;
+  const std::uint64_t stamp = step_.bodies->stamp(body);
+  if (p.stamp != 0 && p.stamp != stamp) forget_spheres(block, lane);
+  p.stamp = stamp;
   if (FlatContact* flat = pool_.flat(number); flat && p.region) {  // the wall may have moved
     store(p.region->normal, flat->polygon.normal);
     flat->polygon.offset = p.region->normal.dot(p.region->origin - x);  // it stands back already
@@ -353,7 +353,8 @@ int ContactStages::pack_list(std::int32_t head, double* to) const {
     std::memcpy(to + m + 10, p.record.velocity, 3 * sizeof(double));
     std::memcpy(to + m + 13, p.record.spin, 3 * sizeof(double));
     to[m + 16] = p.age;
-    std::memcpy(to + m + 17, &p.proof, sizeof p.proof);
+    std::memcpy(to + m + 17, &p.stamp, sizeof p.stamp);
+    std::memcpy(to + m + 18, &p.proof, sizeof p.proof);
     m += kListedSize;
     m += pool_.pack(head, to + m);
   }
@@ -381,7 +382,8 @@ std::int32_t ContactStages::unpack_list(const double* from, int* size) {
     std::memcpy(p.record.spin, values + 13, 3 * sizeof(double));
     std::memcpy(p.record.spin_before, values + 13, 3 * sizeof(double));
     p.age = values[16];
-    std::memcpy(&p.proof, values + 17, sizeof p.proof);
+    std::memcpy(&p.stamp, values + 17, sizeof p.stamp);
+    std::memcpy(&p.proof, values + 18, sizeof p.proof);
     p.proof.contact = number;
     if (last == 0)
       first = number;

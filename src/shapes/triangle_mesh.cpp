@@ -36,22 +36,6 @@ class Sets {
   std::vector<int> parent_;
 };
 
-TriangleMesh drop_unused(const TriangleMesh& mesh) {
-  std::vector<int> place(mesh.points.size(), -1);
-  TriangleMesh out;
-  for (std::array<int, 3> t : mesh.triangles) {
-    for (int& i : t) {
-      if (place[i] < 0) {
-        place[i] = static_cast<int>(out.points.size());
-        out.points.push_back(mesh.points[i]);
-      }
-      i = place[i];
-    }
-    out.triangles.push_back(t);
-  }
-  return out;
-}
-
 // An edge's triangles: key is the smaller end, then the larger one; `forward` of the first one.
 struct EdgeUse {
   int a, b, triangle;
@@ -84,6 +68,22 @@ Vec3 move_to_origin(std::vector<Vec3>& points) {
   const Vec3 middle = bounding_box(points).center();
   for (Vec3& p : points) p -= middle;
   return middle;
+}
+
+TriangleMesh drop_unused(const TriangleMesh& mesh) {
+  std::vector<int> place(mesh.points.size(), -1);
+  TriangleMesh out;
+  for (std::array<int, 3> t : mesh.triangles) {
+    for (int& i : t) {
+      if (place[i] < 0) {
+        place[i] = static_cast<int>(out.points.size());
+        out.points.push_back(mesh.points[i]);
+      }
+      i = place[i];
+    }
+    out.triangles.push_back(t);
+  }
+  return out;
 }
 
 TriangleMesh weld(const TriangleMesh& mesh, double tolerance) {

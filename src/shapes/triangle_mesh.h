@@ -21,6 +21,9 @@ Eigen::AlignedBox3d bounding_box(const std::vector<Vec3>& points);
 // Moves points so that the middle of their bounding box is the origin; returns where it was.
 Vec3 move_to_origin(std::vector<Vec3>& points);
 
+// Without the points that no triangle uses; the others in the order of their use.
+TriangleMesh drop_unused(const TriangleMesh& mesh);
+
 // Points of equal coordinates become one, and so do points closer than `tolerance` (length) that share a cell
 // of that size; triangles that lose a corner go, and so do repeated ones. Points no triangle uses go too.
 TriangleMesh weld(const TriangleMesh& mesh, double tolerance);

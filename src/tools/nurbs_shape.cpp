@@ -206,7 +206,7 @@ class Options {
     if (!(value >= lo && value <= hi)) {
       const bool any_positive = lo == kLeast && hi == kMost;
       fail(name + " is " + text + ", must be " +
-           (any_positive ? "> 0" : "in " + format("%g", lo) + ".." + format("%g", hi)));
+           (any_positive && !(value > hi) ? "> 0" : "in " + format("%g", lo) + ".." + format("%g", hi)));
     }
     return value;
   }
@@ -654,14 +654,20 @@ void print_mass(const Shape& shape) {
   std::printf("  principal        %.12g %.12g %.12g\n", p[0], p[1], p[2]);
 }
 
-double surface_area(const Shape& shape) {  // by the midpoint rule on a fine grid: 4 digits
-  constexpr int kGrid = 48;
+double surface_area(const Shape& shape) {  // by Gauss's rule of four points on a grid of cells
+  constexpr int kGrid = 12;
+  constexpr double kNode[] = {-0.8611363115940526, -0.3399810435848563, 0.3399810435848563,
+                              0.8611363115940526};
+  constexpr double kWeight[] = {0.3478548451374538, 0.6521451548625461, 0.6521451548625461,
+                                0.3478548451374538};
   double area = 0;
   for (const BezierPatch& patch : shape.patches)
-    for (int i = 0; i < kGrid; ++i)
-      for (int j = 0; j < kGrid; ++j) {
-        const Jet1 s = evaluate1(patch, (i + 0.5) / kGrid, (j + 0.5) / kGrid);
-        area += s.su.cross(s.sv).norm() / (kGrid * kGrid);
+    for (int i = 0; i < 4 * kGrid; ++i)
+      for (int j = 0; j < 4 * kGrid; ++j) {
+        const double u = (i / 4 + 0.5 + 0.5 * kNode[i % 4]) / kGrid,
+                     v = (j / 4 + 0.5 + 0.5 * kNode[j % 4]) / kGrid;
+        const Jet1 s = evaluate1(patch, u, v);
+        area += s.su.cross(s.sv).norm() * kWeight[i % 4] * kWeight[j % 4] / (4 * kGrid * kGrid);
       }
   return area;
 }

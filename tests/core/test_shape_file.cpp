@@ -124,6 +124,18 @@ TEST(ShapeFile, WeightsAreOptionalAndPointsCartesian) {
   EXPECT_TRUE(weighted.warnings.empty());
 }
 
+TEST(ShapeFile, AFactorOfAllWeightsMeansNothing) {
+  const ShapeFileContent plain = parse_shape(box_json().dump(), "stone.json");
+  for (const double factor : {0x1p-660, 0x1p-1000, 0x1p990}) {
+    Json root = box_json();
+    for (Json& patch : root["shape"]["data"])
+      for (Json& w : patch["control_points"]["weights"]) w = factor * w.get<double>();
+    const ShapeFileContent scaled = parse_shape(root.dump(), "stone.json");
+    for (size_t k = 0; k < plain.surfaces.size(); ++k)
+      EXPECT_EQ(scaled.surfaces[k].points, plain.surfaces[k].points) << factor;
+  }
+}
+
 TEST(ShapeFile, DecimalsAreCounted) {
   std::vector<NurbsSurface> surfaces = exact_ellipsoid({1, 0.8, 0.6});
   EXPECT_EQ(few_decimals(surfaces), 0);
@@ -228,6 +240,9 @@ TEST(ShapeFileErrors, NotJson) {
   EXPECT_EQ(parse_error("[1e999]"), "stone.json: not valid JSON: a number is out of range");
   EXPECT_NE(parse_error(std::string("{\"shape\": NaN}")).find("not valid JSON at byte 11"),
             std::string::npos);
+  const std::string deep = std::string(100000, '[') + std::string(100000, ']');
+  EXPECT_EQ(parse_error(deep), "stone.json: nested deeper than 64 levels");
+  EXPECT_EQ(parse_error("{\"shape\": " + deep + "}"), "stone.json: nested deeper than 64 levels");
 }
 
 TEST(ShapeFileErrors, TruncatedAnywhereIsReportedWithItsPosition) {

@@ -94,7 +94,7 @@ void tumble_on_plane(const Solid& solid, Random& random, int steps) {
 // ends: bodies all the same, joined, and with the right supports.
 TEST(Solids, weights_of_any_size_are_loaded) {
 #ifdef __SANITIZE_ADDRESS__
-  constexpr int kBodies = 8;  // half a second each, fifteen times that under sanitizers
+  constexpr int kBodies = 3;  // half a second each, fifteen times that under sanitizers
 #else
   constexpr int kBodies = 60;
 #endif

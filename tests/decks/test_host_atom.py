@@ -110,16 +110,19 @@ class PerAtomValues(unittest.TestCase):
         text = (HEADER + "region all block -10 10 -10 10 -10 10\ncreate_box 1 all\n"
                 "create_atoms 1 single 1 2 3\ncreate_atoms 1 single 4 5 6\ncreate_atoms 1 single -4 5 6\n"
                 "create_atoms 1 single 0 0 0\nset atom 2 density 500\nset atom 3 diameter 2\nset atom 4 mass 96\n"
-                "set atom 2 omegax 3\n" + motion() + "run 0\n")
+                "set atom 2 omegax 3\n"
+                # Host words before ours, in one command.
+                "create_atoms 1 single 7 7 0\nset atom 5 diameter 2 density 500 vx 1\n"
+                "create_atoms 1 single -7 7 0\nset atom 6 type 1 mass 96 quat 1 0 0 0 diameter 2\n" + motion() + "run 0\n")
         _, frame = deck.run_ok(text, files=files()).dump("dump.txt")[0]
         radius = np.linalg.norm(BOX)
-        np.testing.assert_allclose(frame["radius"], [radius, radius, 1, radius], rtol=1e-6)
+        np.testing.assert_allclose(frame["radius"], [radius, radius, 1, radius, 1, 1], rtol=1e-6)
         scale = frame["c_body[6]"]
-        np.testing.assert_allclose(scale, [1, 1, 1 / radius, 1], rtol=1e-6)
-        np.testing.assert_allclose(frame["density"], [1, 500, 1, 2000], rtol=1e-12)
+        np.testing.assert_allclose(scale, [1, 1, 1 / radius, 1, 1 / radius, 1 / radius], rtol=1e-6)
+        np.testing.assert_allclose(frame["density"], [1, 500, 1, 2000, 500, 2000], rtol=1e-12)
         np.testing.assert_allclose(frame["mass"], frame["density"] * 0.048 * scale**3, rtol=1e-12)
         np.testing.assert_array_equal(frame["c_body[1]"], 1)
-        np.testing.assert_array_equal(frame["omegax"], [0, 3, 0, 0])
+        np.testing.assert_array_equal(frame["omegax"], [0, 3, 0, 0, 0, 0])
 
 
 class FreeMotion(unittest.TestCase):

@@ -96,6 +96,30 @@ class Size(unittest.TestCase):
             force = 4 / 3 * modulus * radius**0.5 * overlap**1.5
             self.assertAlmostEqual(run.thermo["f"][-1], force, delta=1e-6 * force, msg=wall)
 
+    def test_a_wall_learns_of_a_size_changed_on_the_way(self):
+        """So it is where the contact has come from a restart or another rank before the run that follows."""
+        law = "model hertz tangential history"
+        material = models.materials({"youngsModulus": 5e7, "poissonsRatio": 0.3, "coefficientRestitution": 0.5,
+                                     "coefficientFriction": 0.3}, types=1)
+        modulus, overlap = 5e7 / (2 * (1 - 0.3**2)), 0.011
+        files = {"ball.json": deck.shape_file("sphere", 1),
+                 "floor.stl": meshes.ascii_stl([(-1, -1, 0), (1, -1, 0), (1, 1, 0), (-1, 1, 0)], [(0, 1, 2), (0, 2, 3)]),
+                 "balls.data": deck.data_file([(1, 1, 1, 0.1, 2500.0, 0.0, 0.0, 0.099, 1.0, 0.0, 0.0, 0.0)])}
+        force = 4 / 3 * modulus * 0.11**0.5 * overlap**1.5  # a cylinder's too, as between LIGGGHTS's own
+        for name, wall in (
+                ("mesh", f"fix m all mesh/surface file floor.stl type 1\nfix w all wall/nurbs mesh m type 1 {law}"),
+                ("plane", f"fix w all wall/nurbs plane 0 0 0 0 0 1 type 1 {law} move linear 0 0 0"),
+                ("cylinder", f"fix w all wall/nurbs cylinder y 1 0 1 type 1 {law}")):
+            text = HELD.format(law=law, wall=wall, materials=material)
+            first, last = text.split("set group")
+            half = deck.run_ok(first + "write_restart half.restart\n", files=files)
+            restart = text.replace("read_data balls.data", "read_restart half.restart").replace("run 100\n", "")
+            other_rank = "processors 2 1 1\n" + first + "displace_atoms all move -1e-6 0 0 units box\nset group" + last
+            for way, run in (("at once", deck.run_ok(text, files=files)),
+                             ("restart", deck.run_ok(restart, files={**files, "half.restart": half.path / "half.restart"})),
+                             ("ranks", deck.run_ok(other_rank, files=files, ranks=2))):
+                self.assertAlmostEqual(run.thermo["f"][-1], force, delta=1e-6 * force, msg=f"{name}, {way}")
+
 
 if __name__ == "__main__":
     unittest.main(verbosity=1)

@@ -217,7 +217,7 @@ class Fit(unittest.TestCase):
 
     def test_far_bodies_by_other_ways(self):
         """simplify, export and make take a shape or mesh from far away as from the origin."""
-        made = call("make", "superellipsoid", "--axes", "1,1,1.5", "--exponent", "2.5", "--spans", "8", self.place / "near.json")
+        made = call("make", "superellipsoid", "--axes", "1,1,1.5", "--exponent", "2.5", "--spans", "4", self.place / "near.json")
         self.assertEqual(made.returncode, 0, made.stderr)
         content = json.loads((self.place / "near.json").read_text())
         for s in content["shape"]["data"]:
@@ -288,7 +288,7 @@ class Fit(unittest.TestCase):
                                             ("hexagonal prism", meshes.prism(6, 1, 0.7), 1200),
                                             ("box", meshes.prism(4, 1, 0.5), 800)):
             points = meshes.turned(points, 5) + (3, -1, 2)
-            for tolerance in (0.05, 0.01, 0.003):
+            for tolerance in (0.05, 0.003):
                 with self.subTest(name=name, tolerance=tolerance):
                     said = self.fit(points, faces, "--tolerance", str(tolerance))
                     self.assertLessEqual(int(re.search(r"(\d+) control points in the file", said)[1]), most)
@@ -300,16 +300,15 @@ class Fit(unittest.TestCase):
     def test_round_edges_are_seen(self):
         """A rounded box as triangles becomes one again, of its own radius."""
         box = self.place / "box.json"
-        for rounding in (0.05, 0.1):
-            call("make", "rounded-box", "--axes", "1,0.8,0.6", "--rounding", str(rounding), "-o", box).check_returncode()
-            call("export", box, "-o", self.place / "box.stl").check_returncode()
-            for tolerance in (0.02, 0.01):
-                with self.subTest(rounding=rounding, tolerance=tolerance):
-                    said = call("fit", self.place / "box.stl", "--tolerance", str(tolerance), "-o", self.out)
-                    self.assertEqual(said.returncode, 0, said.stderr)
-                    self.assertIn("polyhedron of 6 faces with rounded edges; 54 patches", said.stdout)
-                    self.assertAlmostEqual(float(re.search(r"; curvature radius (\S+) to", said.stdout)[1]) / rounding, 1, 1)
-                    self.assert_near(sample(box, 12)[0], 0.003)
+        for rounding, tolerance in ((0.05, 0.02), (0.1, 0.01)):
+            with self.subTest(rounding=rounding):
+                call("make", "rounded-box", "--axes", "1,0.8,0.6", "--rounding", str(rounding), "-o", box).check_returncode()
+                call("export", box, "-o", self.place / "box.stl").check_returncode()
+                said = call("fit", self.place / "box.stl", "--tolerance", str(tolerance), "-o", self.out)
+                self.assertEqual(said.returncode, 0, said.stderr)
+                self.assertIn("polyhedron of 6 faces with rounded edges; 54 patches", said.stdout)
+                self.assertAlmostEqual(float(re.search(r"; curvature radius (\S+) to", said.stdout)[1]) / rounding, 1, 1)
+                self.assert_near(sample(box, 12)[0], 0.003)
 
     def test_crystals_get_splines_of_fewer_points(self):
         """More than twelve faces are no reason for thousands of points: a smooth body of less than 1,000 is as near."""
@@ -330,7 +329,7 @@ class Fit(unittest.TestCase):
         points, faces = meshes.icosphere(0)
         points = points * np.random.default_rng(14).uniform(0.8, 1.2, size=(len(points), 1)) * (1.5, 1, 1)
         counts = []
-        for tolerance in ("10%", "8%", "6%"):
+        for tolerance in ("10%", "6%"):
             said = self.fit(points, faces, "--tolerance", tolerance)
             counts.append(int(re.search(r"(\d+) control points in the file", said)[1]))
             self.assertIn("strictly convex", call("info", self.out).stdout)
@@ -396,6 +395,7 @@ class Fit(unittest.TestCase):
                               ("h.stl", "\ufeff" + plain), ("n.stl", "\n\r\n  " + plain), ("i.obj", table.replace("\n", "\r\n")),
                               ("j.obj", table.replace("\n", "\r")), ("k.obj", "\ufeff" + table), ("l.obj", counted),
                               ("m.stl", b"solid binary".ljust(80) + meshes.binary_stl(points, turned)[80:] + b"tail"),
+                              ("q.obj", "v 1e6 0 0\n" + meshes.obj(points, turned + 1)),
                               ("a.stl", meshes.ascii_stl(points, turned)), ("b.obj", meshes.obj(points, turned)),
                               ("c.ply", meshes.ply(points, faces)),
                               ("o.ply", meshes.ply(points, faces).replace("\n", "\r\n")),
@@ -435,6 +435,7 @@ class Fit(unittest.TestCase):
                 ("a.stl", b"", "empty"), ("a.stl", whole[:-20], "ends after 79"), ("a.stl", bytes(nan), "not finite"),
                 ("a.stl", text[:len(text) // 2], "a.stl: "), ("a.stl", text.replace("vertex", "vertx", 1), "unexpected"),
                 ("a.stl", meshes.binary_stl(points, faces[1:]), "is open: 3 edges"),
+                ("a.stl", whole[:80] + (79).to_bytes(4, "little") + whole[84:], "by its header, holds 1 more"),
                 ("a.stl", meshes.binary_stl(flat, faces), "a.stl: "), ("a.stl", meshes.binary_stl(points, faces[:0]), "no triangles"),
                 ("a.obj", meshes.obj(points, faces + 1), "face corner '43'"), ("a.obj", "v 0 0\nf 1 1 1\n", "line 1"),
                 ("a.obj", "v 1.2.3 4 5\n" + meshes.obj(points, faces - 1), "line 1"),
@@ -457,13 +458,13 @@ class Fit(unittest.TestCase):
             self.assert_one_error(call("fit", mesh, *options, "-o", self.out), error)
 
     def test_simplify(self):
-        made = call("make", "superellipsoid", "--axes", "1,1,1.5", "--exponent", "2.5", "--spans", "8", self.place / "fine.json")
+        made = call("make", "superellipsoid", "--axes", "1,1,1.5", "--exponent", "2.5", "--spans", "4", self.place / "fine.json")
         self.assertEqual(made.returncode, 0, made.stderr)
         run = call("simplify", self.place / "fine.json", "--tolerance", "2%", "-o", self.out)
         self.assertEqual(run.returncode, 0, run.stderr)
         points, _ = sample(self.place / "fine.json", 40)
         self.assert_near(points, 0.02)
-        again = call("simplify", self.out, "--tolerance", "0.03%", "-o", self.place / "again.json")
+        again = call("simplify", self.out, "--tolerance", "0.3%", "-o", self.place / "again.json")
         self.assertEqual(again.returncode, 1)
         self.assertIn("ERROR: ", again.stderr)
 

@@ -17,7 +17,11 @@ double longest_side2(const Triangle& t) {
 
 // Twice the area over the squared longest side: below this a triangle has no plane of its own.
 constexpr double kNoArea = 1e-12;
-constexpr double kOnePlane = 1e-3;  // of the distance within which corners are one: planes are, at least
+constexpr double kOnePlane = 1e-3;       // of the distance within which corners are one: planes are, at least
+constexpr double kCellOfVertices = 16;   // of that distance
+constexpr double kCellOfNormals = 0.01;  // in which planes are looked up by their normals ...
+constexpr int kFewPlanes = 16;           // ... where there are more
+constexpr double kNormalRoundoff = 1e-9;
 
 }  // namespace
 
@@ -62,24 +66,22 @@ void MeshPatch::weld(const Triangle* triangles, int count, double distance) {
   vertices_.clear();
   cells_.clear();
   corners_.clear();
-  const double near2 = distance * distance;
-  // Vertices by their first coordinate, so that few are compared.
-  std::vector<std::pair<double, int>>& by_x = by_x_;
-  by_x.clear();
+  const double near2 = distance * distance, size = distance > 0 ? kCellOfVertices * distance : 1;
+  vertices_by_place_.clear(count);
+  cells_by_corners_.clear(count);
   for (int t = 0; t < count; ++t) {
     const Triangle& triangle = triangles[t];
     if (!(2 * area_vector(triangle).norm() > kNoArea * longest_side2(triangle))) continue;
     std::array<int, 3> at;
     for (int k = 0; k < 3; ++k) {
-      at[k] = -1;
-      const double x = triangle[k][0];
-      auto near = std::lower_bound(by_x.begin(), by_x.end(), std::make_pair(x - distance, -1));
-      for (; near != by_x.end() && near->first <= x + distance && at[k] < 0; ++near)
-        if ((vertices_[near->second].x - triangle[k]).squaredNorm() <= near2) at[k] = near->second;
-      if (at[k] >= 0) continue;
-      at[k] = static_cast<int>(vertices_.size());
+      const int last = static_cast<int>(vertices_.size());
+      at[k] = last;
+      vertices_by_place_.visit_near(triangle[k], distance, size, [&](int v) {
+        if (v < at[k] && (vertices_[v].x - triangle[k]).squaredNorm() <= near2) at[k] = v;
+      });
+      if (at[k] < last) continue;
       vertices_.push_back({triangle[k], t, k, 0, 0, 0, 0, false});
-      by_x.insert(std::lower_bound(by_x.begin(), by_x.end(), std::make_pair(x, at[k])), {x, at[k]});
+      vertices_by_place_.add(SpatialHash::cell_of(triangle[k], size));
     }
     add_cell(at, t);
   }
@@ -88,8 +90,15 @@ void MeshPatch::weld(const Triangle* triangles, int count, double distance) {
 // A triangle of three vertices, if it is one and there is none of them yet.
 void MeshPatch::add_cell(const std::array<int, 3>& at, int triangle) {
   if (at[0] == at[1] || at[1] == at[2] || at[2] == at[0]) return;
-  for (const Cell& cell : cells_)
-    if (std::is_permutation(at.begin(), at.end(), corners_.begin() + cell.first)) return;
+  std::array<int, 3> sorted = at;
+  std::sort(sorted.begin(), sorted.end());
+  const SpatialHash::Cell key{double(sorted[0]), double(sorted[1]), double(sorted[2])};
+  bool known = false;
+  cells_by_corners_.visit(key, [&](int c) {
+    known = known || std::is_permutation(at.begin(), at.end(), corners_.begin() + cells_[c].first);
+  });
+  if (known) return;
+  cells_by_corners_.add(key);
   cells_.push_back({triangle, -1, static_cast<int>(corners_.size()), 3});
   corners_.insert(corners_.end(), at.begin(), at.end());
 }
@@ -141,6 +150,7 @@ void MeshPatch::close_cracks(double distance) {
   std::vector<int> corners;
   cells.swap(cells_);
   corners.swap(corners_);
+  cells_by_corners_.clear(cells.size());
   for (const Cell& cell : cells)
     add_cell({one[corners[cell.first]], one[corners[cell.first + 1]], one[corners[cell.first + 2]]},
              cell.triangle);
@@ -211,6 +221,28 @@ bool MeshPatch::is_beside(const Cell& cell, int k, const Vec3& x) const {
   return (!splits(k) || way.dot(x - at(k)) >= 0) && (!splits(end) || way.dot(x - at(end)) < 0);
 }
 
+// The first plane within a distance of a triangle's corners, or -1. Its normal is off the triangle's by no
+// more than the distance over the triangle's least height allows, in sine: height over the plane is linear.
+int MeshPatch::find_plane(const Triangle& t, double distance) const {
+  const int none = static_cast<int>(planes_.size());
+  int found = none;
+  const auto look = [&](int p) {
+    const auto height = [&](const Vec3& x) { return std::abs(planes_[p].normal.dot(x - planes_[p].origin)); };
+    if (p < found && std::max({height(t[0]), height(t[1]), height(t[2])}) <= distance) found = p;
+  };
+  const Vec3 area = area_vector(t);
+  const double least_height = 2 * area.norm() / std::sqrt(longest_side2(t)),
+               off = 2.1 * distance / least_height + kNormalRoundoff;
+  if (none <= kFewPlanes || !(off <= 0.5 * kCellOfNormals)) {
+    for (int p = 0; p < found; ++p) look(p);
+  } else {
+    const Vec3 normal = area.normalized();
+    planes_by_normal_.visit_near(normal, off, kCellOfNormals, look);
+    planes_by_normal_.visit_near(-normal, off, kCellOfNormals, look);
+  }
+  return found < none ? found : -1;
+}
+
 // The largest triangles lay down the planes; those whose corners lie in one belong to it.
 void MeshPatch::find_planes(const Triangle* triangles, double distance) {
   order_.resize(cells_.size());
@@ -219,18 +251,14 @@ void MeshPatch::find_planes(const Triangle* triangles, double distance) {
   for (std::size_t c = 0; c < cells_.size(); ++c) area[c] = area_vector(triangles[cells_[c].triangle]).norm();
   std::stable_sort(order_.begin(), order_.end(), [&](int a, int b) { return area[a] > area[b]; });
   planes_.clear();
+  planes_by_normal_.clear(cells_.size());
   for (const int c : order_) {
     const Triangle& t = triangles[cells_[c].triangle];
-    int plane = -1;
-    for (std::size_t p = 0; p < planes_.size() && plane < 0; ++p) {
-      const auto height = [&](const Vec3& x) {
-        return std::abs(planes_[p].normal.dot(x - planes_[p].origin));
-      };
-      if (std::max({height(t[0]), height(t[1]), height(t[2])}) <= distance) plane = static_cast<int>(p);
-    }
+    int plane = find_plane(t, distance);
     if (plane < 0) {
       plane = static_cast<int>(planes_.size());
       planes_.push_back({area_vector(t).normalized(), t[0], 0, 0, cells_[c].triangle, 0, 0, 0, 0, 0, 0});
+      planes_by_normal_.add(SpatialHash::cell_of(planes_.back().normal, kCellOfNormals));
     }
     cells_[c].plane = plane;
   }

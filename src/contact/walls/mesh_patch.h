@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "contact/walls/plane_region.h"
+#include "contact/walls/spatial_hash.h"
 
 namespace nurbs {
 
@@ -56,7 +57,8 @@ class MeshPatch {
   // From triangles in an order that does not depend on ranks; corners closer than `weld` (length) are one.
   // Triangles without area are left out, and those with the corners of an earlier one. Triangles within
   // `flat` (length) of a larger one's plane lie in it. Borders within `crack` (length) of each other are
-  // none: files of few digits open them where triangles do not conform. O(n^2) in the number of triangles.
+  // none: files of few digits open them where triangles do not conform. O(n log n) in the number of
+  // triangles, O(n^2) in that of sides that no other triangle has.
   void build(const Triangle* triangles, int count, double weld, double flat = 0, double crack = 0);
   // A single plane without bounds.
   void build_plane(const Vec3& origin, const Vec3& normal);
@@ -101,6 +103,7 @@ class MeshPatch {
   void close_cracks(double distance);
   bool is_beside(const Cell& cell, int k, const Vec3& x) const;
   void split_sides(double distance);
+  int find_plane(const Triangle& t, double distance) const;
   void find_planes(const Triangle* triangles, double distance);
   void find_edges();
   void link_vertices();
@@ -118,7 +121,7 @@ class MeshPatch {
   std::vector<double> signs_;
   std::vector<char> splits_;  // corners of other triangles, on a side of the cell's own
   std::vector<Key> keys_;
-  std::vector<std::pair<double, int>> by_x_;
+  SpatialHash vertices_by_place_, cells_by_corners_, planes_by_normal_;
   std::vector<PlaneCells> outlines_;  // by plane; empty until asked for
   bool unbounded_ = false;
 };
