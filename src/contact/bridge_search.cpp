@@ -110,11 +110,13 @@ std::optional<Branches> known_branches(const PairFrame& pair, const JointSolutio
 }
 
 // The body near a dent whose two supports are nearest to equally high.
-std::optional<Branches> find_branches(const PairFrame& pair, const Vec3& d, const JointSolution& s) {
+std::optional<Branches> find_branches(const PairFrame& pair, const Vec3& d, double tolerance,
+                                      const JointSolution& s) {
   const Vec3 on_b = pair.direction_on_b(d);
   const Support a = find_support(*pair.a, d, &s.points.on_a), b = find_support(*pair.b, on_b, &s.points.on_b);
   Support other_a, other_b;
-  const bool may_a = find_rival(*pair.a, d, a, &other_a), may_b = find_rival(*pair.b, on_b, b, &other_b);
+  const bool may_a = has_dents(*pair.a, pair.scale_a, tolerance) && find_rival(*pair.a, d, a, &other_a),
+             may_b = has_dents(*pair.b, pair.scale_b, tolerance) && find_rival(*pair.b, on_b, b, &other_b);
   if (!may_a && !may_b) return std::nullopt;
   const bool of_a = may_a && (!may_b || pair.scale_a * std::abs(a.h - other_a.h) <=
                                             pair.scale_b * std::abs(b.h - other_b.h));
@@ -126,10 +128,11 @@ std::optional<Branches> find_branches(const PairFrame& pair, const Vec3& d, cons
 
 bool meet_bridge(const PairFrame& pair, const Vec3& direction, double tolerance, double tilt,
                  JointSolution* s, Bridge* bridge) {
-  if (!pair.a->dented() && !pair.b->dented()) return false;
+  if (!has_dents(*pair.a, pair.scale_a, tolerance) && !has_dents(*pair.b, pair.scale_b, tolerance))
+    return false;
   const bool known = bridge->known();
   std::optional<Branches> branches =
-      known ? known_branches(pair, *s, *bridge) : find_branches(pair, direction, *s);
+      known ? known_branches(pair, *s, *bridge) : find_branches(pair, direction, tolerance, *s);
   if (!branches) return false;
   Branches& at = *branches;
   Vec3 d = direction;

@@ -24,6 +24,11 @@ NURBS_INLINE Mask<Real> dents_count(const Real& excess, const Real& tolerance) {
   return excess > 0.1 * tolerance;
 }
 
+// Whether the hull reaches beyond a body's surface by what counts: round-off of joints does not.
+inline bool has_dents(const Shape& shape, double scale, double tolerance) {
+  return shape.dented() && dents_count(scale * shape.support_excess, tolerance);
+}
+
 // h_A(d) + h_B(-d) at most, of the hulls, right to kSupportShare of `tolerance`; lengths of the lab. 0.1 us
 // for each body, 0.4 us where a dent is near.
 inline double confirmed_heights(const NormalSide& a, const NormalSide& b, double tolerance) {

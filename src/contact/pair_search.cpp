@@ -162,7 +162,9 @@ class Ladder {
   // A contact on a crease or over a dent, where the surfaces have no common normal.
   bool meet_edge(const PairFrame& pair, double tolerance, JointSolution* s, ContactResult* r) {
     if (memory_.proof.contact == 0 || !has_proof(memory_.proof)) return false;
-    const bool creased = !pair.a->smooth || !pair.b->smooth, dented = pair.a->dented() || pair.b->dented();
+    const bool creased = !pair.a->smooth || !pair.b->smooth,
+               dented =
+                   has_dents(*pair.a, pair.scale_a, tolerance) || has_dents(*pair.b, pair.scale_b, tolerance);
     if (!creased && (!dented || is_too_deep(*s))) return false;
     const Vec3 d = last_direction(pair);
     Bridge bridge;

@@ -122,9 +122,9 @@ class HostModels::Combination : public host::ContactModelBase, public LIGGGHTS::
     names.push_back(name);
     return static_cast<int>(names.size()) - 1;
   }
-  int offset(const char* name) const {
-    const auto at = std::find(names.begin(), names.end(), name);
-    return at == names.end() ? -1 : static_cast<int>(at - names.begin());
+  // Where the tangential spring is in the history.
+  int shear() const {
+    return shear_;
   }
 
   // Empty, or what is wrong with the words.
@@ -139,6 +139,7 @@ class HostModels::Combination : public host::ContactModelBase, public LIGGGHTS::
     cohesion_->postSettings(this, this);
     tangential_->postSettings(this, this);
     rolling_->postSettings(this, this);
+    shear_ = static_cast<int>(std::find(names.begin(), names.end(), "shearx") - names.begin());
     return "";
   }
 
@@ -212,6 +213,7 @@ class HostModels::Combination : public host::ContactModelBase, public LIGGGHTS::
   std::unique_ptr<host::TangentialModelBase> tangential_;
   std::unique_ptr<host::RollingModelBase> rolling_;
   double** friction_ = nullptr;
+  int shear_ = 0;
 };
 
 bool HostModels::named_by(int narg, char** arg) {
@@ -427,7 +429,7 @@ void HostModels::force(ModelContact& c) const {
   if (models_->elastic()) c.normal_energy = s.kn * c.overlap * c.overlap / (1 + models_->exponent());
   if (models_->cohesive()) c.normal_energy += models_->cohesive_energy(s);
   if (models_->ids[1] == host::TANGENTIAL_HISTORY)
-    c.tangential_energy = 0.5 * s.kt * Vec3::Map(c.history + models_->offset("shearx")).squaredNorm();
+    c.tangential_energy = 0.5 * s.kt * Vec3::Map(c.history + models_->shear()).squaredNorm();
 }
 
 }  // namespace LAMMPS_NS::nurbs_host

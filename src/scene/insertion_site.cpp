@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "contact/overlap/overlap_test.h"
 #include "contact/pair_search.h"
 
 namespace nurbs {
@@ -82,6 +83,8 @@ bool InsertionSite::meets(const Particle& a, const Particle& b, Overlap judge) c
   if (distance2 > outer * outer) return false;
   const double inner = a.scale * a.shape->inner_radius + b.scale * b.shape->inner_radius;
   if (judge == Overlap::sphere || distance2 <= inner * inner) return true;
+  const PairFrame pair(a, b);
+  if (const std::optional<bool> known = test_overlap(pair, kTolerance * pair.size)) return *known;
   ContactSettings settings;
   settings.tolerance = kTolerance;
   settings.reach = 0;
