@@ -125,26 +125,39 @@ std::vector<MeshPatch::Key> MeshPatch::lonely_sides() {
   return lonely;
 }
 
-// Makes one of the ends of lonely sides that are within a distance.
-void MeshPatch::close_cracks(double distance) {
+// The vertices at the ends of sides, each once.
+std::vector<int> MeshPatch::ends_of(const std::vector<Key>& sides) {
   std::vector<int> ends;
-  for (const Key& side : lonely_sides()) {
+  for (const Key& side : sides) {
     ends.push_back(side.low);
     ends.push_back(side.high);
   }
   std::sort(ends.begin(), ends.end());
   ends.erase(std::unique(ends.begin(), ends.end()), ends.end());
-  std::vector<int> one(vertices_.size());
+  return ends;
+}
+
+// Makes one of the ends of lonely sides that are within a distance: the first, of those that are none's.
+void MeshPatch::close_cracks(double distance) {
+  const std::vector<int> ends = ends_of(lonely_sides());
+  const double size = kCellOfVertices * distance;
+  vertices_by_place_.clear(ends.size());
+  std::vector<int> one(vertices_.size()), kept;
   for (std::size_t v = 0; v < one.size(); ++v) one[v] = static_cast<int>(v);
   bool any = false;
-  for (std::size_t i = 0; i < ends.size(); ++i)
-    for (std::size_t j = 0; j < i; ++j)
-      if (one[ends[j]] == ends[j] &&
-          (vertices_[ends[i]].x - vertices_[ends[j]].x).squaredNorm() <= distance * distance) {
-        one[ends[i]] = ends[j];
-        any = true;
-        break;
-      }
+  for (const int end : ends) {
+    const Vec3& x = vertices_[end].x;
+    vertices_by_place_.visit_near(x, distance, size, [&](int k) {
+      if (kept[k] < one[end] && (x - vertices_[kept[k]].x).squaredNorm() <= distance * distance)
+        one[end] = kept[k];
+    });
+    if (one[end] == end) {
+      kept.push_back(end);
+      vertices_by_place_.add(SpatialHash::cell_of(x, size));
+    } else {
+      any = true;
+    }
+  }
   if (!any) return;
   std::vector<Cell> cells;
   std::vector<int> corners;
@@ -165,23 +178,25 @@ void MeshPatch::split_sides(double distance) {
     int vertex;
   };
   std::vector<Split> splits;
-  std::vector<char> seen(vertices_.size());
+  std::vector<int> ends = ends_of(lonely);
+  const auto first_coordinate = [&](int v) { return vertices_[v].x[0]; };
+  std::sort(ends.begin(), ends.end(), [&](int a, int b) {
+    return first_coordinate(a) != first_coordinate(b) ? first_coordinate(a) < first_coordinate(b) : a < b;
+  });
   for (const Key& side : lonely) {
     const Vec3 &p = vertices_[side.low].x, &q = vertices_[side.high].x, way = q - p;
-    const double length2 = way.squaredNorm();
-    std::fill(seen.begin(), seen.end(), 0);
-    for (int k = 0; k < 3; ++k) seen[corners_[cells_[side.cell].first + k]] = 1;  // its own: a needle's
-    for (const Key& other : lonely)
-      for (const int v : {other.low, other.high}) {
-        if (seen[v]) continue;
-        seen[v] = 1;
-        const Vec3 x = vertices_[v].x - p;
-        const double t = x.dot(way) / length2;
-        if (!(t > 0 && t < 1) || (x - t * way).squaredNorm() > distance * distance) continue;
-        const int k = side.slot;
-        const bool forward = corners_[cells_[side.cell].first + k] == side.low;
-        splits.push_back({side.cell, k, forward ? t : 1 - t, v});
-      }
+    const double length2 = way.squaredNorm(), to = std::max(p[0], q[0]) + distance;
+    const auto own = corners_.begin() + cells_[side.cell].first;  // and the third: a needle's
+    auto end = std::lower_bound(ends.begin(), ends.end(), std::min(p[0], q[0]) - distance,
+                                [&](int v, double x) { return first_coordinate(v) < x; });
+    for (; end != ends.end() && first_coordinate(*end) <= to; ++end) {
+      if (std::find(own, own + 3, *end) != own + 3) continue;
+      const Vec3 x = vertices_[*end].x - p;
+      const double t = x.dot(way) / length2;
+      if (!(t > 0 && t < 1) || (x - t * way).squaredNorm() > distance * distance) continue;
+      const bool forward = own[side.slot] == side.low;
+      splits.push_back({side.cell, side.slot, forward ? t : 1 - t, *end});
+    }
   }
   splits_.assign(corners_.size(), 0);
   if (splits.empty()) return;

@@ -58,7 +58,7 @@ class MeshPatch {
   // Triangles without area are left out, and those with the corners of an earlier one. Triangles within
   // `flat` (length) of a larger one's plane lie in it. Borders within `crack` (length) of each other are
   // none: files of few digits open them where triangles do not conform. O(n log n) in the number of
-  // triangles, O(n^2) in that of sides that no other triangle has.
+  // triangles, as a rule.
   void build(const Triangle* triangles, int count, double weld, double flat = 0, double crack = 0);
   // A single plane without bounds.
   void build_plane(const Vec3& origin, const Vec3& normal);
@@ -100,6 +100,7 @@ class MeshPatch {
   void weld(const Triangle* triangles, int count, double distance);
   void add_cell(const std::array<int, 3>& at, int triangle);
   std::vector<Key> lonely_sides();
+  static std::vector<int> ends_of(const std::vector<Key>& sides);
   void close_cracks(double distance);
   bool is_beside(const Cell& cell, int k, const Vec3& x) const;
   void split_sides(double distance);
