@@ -626,15 +626,15 @@ class Cylinders(unittest.TestCase):
         tablet = deck.shape_file("tablet", 1, height=0.9, rim=0.2)
         for body in (shape("ellipsoid", 1.2, 1, 0.8), tablet, shape("box", 1, 0.8, 0.6)):
             options = dict(body=body, law=LAW + " move rotate origin 0 0 0.1 axis 0 1 0 period 1")
-            one = run(wall, steps="run 6000", **options)
+            one = run(wall, steps="run 12000", **options)
             self.assertGreater(np.sum(one.thermo["st[8]"]), 3)
             for ranks in (2, 4):
-                self.assertEqual(last(run(wall, steps="run 6000", ranks=ranks, **options)), last(one))
-            self.assertEqual(last(run(wall, steps="run 2321\nrun 3679", **options)), last(one))
+                self.assertEqual(last(run(wall, steps="run 12000", ranks=ranks, **options)), last(one))
+            self.assertEqual(last(run(wall, steps="run 4321\nrun 7679", **options)), last(one))
             options["law"] = LAW  # the clock of a motion counts in round-off
-            one = run(wall, steps="run 6000", **options)
-            half = run(wall, steps="run 3321\nwrite_restart half.rst", ranks=2, **options)
-            self.assertEqual(last(run(wall, steps="run 2679", ranks=4, files={"half.rst": half.path / "half.rst"},
+            one = run(wall, steps="run 12000", **options)
+            half = run(wall, steps="run 7321\nwrite_restart half.rst", ranks=2, **options)
+            self.assertEqual(last(run(wall, steps="run 4679", ranks=4, files={"half.rst": half.path / "half.rst"},
                                       start=restart, **options)), last(one))
 
 
