@@ -80,13 +80,13 @@ bool has_weights(const Json& net) {
   return net.contains("weights") && !net["weights"].is_null();
 }
 
-// A factor common to a patch's weights means nothing: a power of two that brings the largest near 1, where it
-// is so far from it that squares might leave the range of numbers.
-double weight_unit(const std::vector<double>& weights) {
+// A factor common to a patch's weights means nothing: the power of two of the largest, where it is so far
+// from 1 that squares might leave the range of numbers, else 0.
+int common_power(const std::vector<double>& weights) {
   constexpr int kFar = 64;
   const double largest = *std::max_element(weights.begin(), weights.end());
   const int power = largest > 0 ? std::ilogb(largest) : 0;
-  return std::abs(power) > kFar ? std::ldexp(1.0, -power) : 1;
+  return std::abs(power) > kFar ? power : 0;
 }
 
 std::vector<Vec4> parse_points(const Json& net, size_t expected, const Place& place) {
@@ -98,7 +98,7 @@ std::vector<Vec4> parse_points(const Json& net, size_t expected, const Place& pl
     require_count(weights.size(), expected, "weights", "size_u * size_v", place);
   }
   std::vector<Vec4> out(expected);
-  const double unit = weight_unit(weights);
+  const int power = common_power(weights);
   for (size_t i = 0; i < expected; ++i) {
     const std::string name = "points[" + std::to_string(i) + "]";
     if (!points[i].is_array() || points[i].size() != 3) {
@@ -106,7 +106,7 @@ std::vector<Vec4> parse_points(const Json& net, size_t expected, const Place& pl
     }
     if (!(weights[i] > 0))
       place.fail("weights[" + std::to_string(i) + "] = " + quote(net["weights"][i]) + ", must be > 0");
-    const double w = unit * weights[i];
+    const double w = std::ldexp(weights[i], -power);
     for (int c = 0; c < 3; ++c) {
       out[i][c] = w * finite_number(points[i][c], name + "[" + std::to_string(c) + "]", place);
     }

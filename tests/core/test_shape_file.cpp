@@ -126,7 +126,7 @@ TEST(ShapeFile, WeightsAreOptionalAndPointsCartesian) {
 
 TEST(ShapeFile, AFactorOfAllWeightsMeansNothing) {
   const ShapeFileContent plain = parse_shape(box_json().dump(), "stone.json");
-  for (const double factor : {0x1p-660, 0x1p-1000, 0x1p990}) {
+  for (const double factor : {0x1p-660, 0x1p-1060, 0x1p990}) {
     Json root = box_json();
     for (Json& patch : root["shape"]["data"])
       for (Json& w : patch["control_points"]["weights"]) w = factor * w.get<double>();
