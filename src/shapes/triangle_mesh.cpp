@@ -3,20 +3,13 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdint>
 #include <numeric>
 #include <unordered_map>
 
+#include "nurbs/spatial_hash.h"
+
 namespace nurbs {
 namespace {
-
-struct CellHash {
-  size_t operator()(const std::array<std::int64_t, 3>& c) const {
-    std::uint64_t h = 0xcbf29ce484222325ull;
-    for (std::int64_t x : c) h = (h ^ static_cast<std::uint64_t>(x)) * 0x9e3779b97f4a7c15ull, h ^= h >> 29;
-    return h;
-  }
-};
 
 // Sets that grow together.
 class Sets {
@@ -87,28 +80,23 @@ TriangleMesh drop_unused(const TriangleMesh& mesh) {
 }
 
 TriangleMesh weld(const TriangleMesh& mesh, double tolerance) {
-  std::unordered_map<std::array<std::int64_t, 3>, int, CellHash> cells;
-  const double inverse = 1 / std::max(tolerance, 1e-300);
+  constexpr double kCell = 16, kLeast = 1e-9;  // of the tolerance; of the mesh's extent
+  const double size =
+      std::max({kCell * tolerance, kLeast * bounding_box(mesh.points).diagonal().norm(), 1e-300});
+  SpatialHash cells;
+  cells.clear(mesh.points.size());
   std::vector<int> place(mesh.points.size());
   TriangleMesh out;
   for (size_t k = 0; k < mesh.points.size(); ++k) {
-    std::array<std::int64_t, 3> low{};
-    for (int c = 0; c < 3; ++c)
-      low[c] = static_cast<std::int64_t>(std::floor(mesh.points[k][c] * inverse - 0.5));
-    int found = -1;
-    for (int corner = 0; corner < 8 && found < 0; ++corner) {
-      const auto it = cells.find({low[0] + (corner & 1), low[1] + (corner >> 1 & 1), low[2] + (corner >> 2)});
-      if (it != cells.end() && (out.points[it->second] - mesh.points[k]).norm() <= tolerance)
-        found = it->second;
-    }
-    if (found < 0) {
-      found = static_cast<int>(out.points.size());
-      out.points.push_back(mesh.points[k]);
-      std::array<std::int64_t, 3> own{};
-      for (int c = 0; c < 3; ++c) own[c] = static_cast<std::int64_t>(std::floor(mesh.points[k][c] * inverse));
-      cells.emplace(own, found);
-    }
-    place[k] = found;
+    const Vec3& x = mesh.points[k];
+    const int last = static_cast<int>(out.points.size());
+    place[k] = last;
+    cells.visit_near(x, tolerance, size, [&](int i) {
+      if (i < place[k] && (out.points[i] - x).norm() <= tolerance) place[k] = i;
+    });
+    if (place[k] < last) continue;
+    out.points.push_back(x);
+    cells.add(SpatialHash::cell_of(x, size));
   }
   std::vector<std::pair<std::array<int, 3>, int>> keys;
   std::vector<std::array<int, 3>> kept;

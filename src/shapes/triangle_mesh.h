@@ -24,8 +24,8 @@ Vec3 move_to_origin(std::vector<Vec3>& points);
 // Without the points that no triangle uses; the others in the order of their use.
 TriangleMesh drop_unused(const TriangleMesh& mesh);
 
-// Points of equal coordinates become one, and so do points closer than `tolerance` (length) that share a cell
-// of that size; triangles that lose a corner go, and so do repeated ones. Points no triangle uses go too.
+// A point within `tolerance` (length) of an earlier one that stays becomes that; triangles that lose a corner
+// go, and so do repeated ones. Points no triangle uses go too.
 TriangleMesh weld(const TriangleMesh& mesh, double tolerance);
 
 // The connected pieces (over shared points), largest bounding box first.

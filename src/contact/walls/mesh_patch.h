@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "contact/walls/plane_region.h"
-#include "contact/walls/spatial_hash.h"
+#include "nurbs/spatial_hash.h"
 
 namespace nurbs {
 
