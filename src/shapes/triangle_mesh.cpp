@@ -29,6 +29,24 @@ class Sets {
   std::vector<int> parent_;
 };
 
+// These triangles of a mesh and the points that they use. `place`: of the mesh's points in what is made;
+// below 0 for those that no earlier call has used.
+TriangleMesh with_own_points(const TriangleMesh& mesh, const std::vector<std::array<int, 3>>& triangles,
+                             std::vector<int>& place) {
+  TriangleMesh out;
+  for (std::array<int, 3> t : triangles) {
+    for (int& i : t) {
+      if (place[i] < 0) {
+        place[i] = static_cast<int>(out.points.size());
+        out.points.push_back(mesh.points[i]);
+      }
+      i = place[i];
+    }
+    out.triangles.push_back(t);
+  }
+  return out;
+}
+
 // An edge's triangles: key is the smaller end, then the larger one; `forward` of the first one.
 struct EdgeUse {
   int a, b, triangle;
@@ -65,18 +83,7 @@ Vec3 move_to_origin(std::vector<Vec3>& points) {
 
 TriangleMesh drop_unused(const TriangleMesh& mesh) {
   std::vector<int> place(mesh.points.size(), -1);
-  TriangleMesh out;
-  for (std::array<int, 3> t : mesh.triangles) {
-    for (int& i : t) {
-      if (place[i] < 0) {
-        place[i] = static_cast<int>(out.points.size());
-        out.points.push_back(mesh.points[i]);
-      }
-      i = place[i];
-    }
-    out.triangles.push_back(t);
-  }
-  return out;
+  return with_own_points(mesh, mesh.triangles, place);
 }
 
 TriangleMesh weld(const TriangleMesh& mesh, double tolerance) {
@@ -124,36 +131,24 @@ std::vector<TriangleMesh> split_pieces(const TriangleMesh& mesh) {
     sets.join(t[0], t[2]);
   }
   std::unordered_map<int, size_t> piece_of;
-  std::vector<TriangleMesh> pieces;
+  std::vector<std::vector<std::array<int, 3>>> pieces;
   for (const auto& t : mesh.triangles) {
     const auto [it, fresh] = piece_of.emplace(sets.find(t[0]), pieces.size());
     if (fresh) pieces.emplace_back();
-    pieces[it->second].triangles.push_back(t);
+    pieces[it->second].push_back(t);
   }
   std::vector<std::pair<double, size_t>> order;
   for (size_t k = 0; k < pieces.size(); ++k) {
     Eigen::AlignedBox3d box;
-    for (const auto& t : pieces[k].triangles)
+    for (const auto& t : pieces[k])
       for (int i : t) box.extend(mesh.points[i]);
     order.emplace_back(-box.diagonal().norm(), k);
   }
   std::sort(order.begin(), order.end());
   std::vector<TriangleMesh> out;
   std::vector<int> place(mesh.points.size(), -1);
-  for (const auto& [size, k] : order) {
-    TriangleMesh piece;
-    for (std::array<int, 3> t : pieces[k].triangles) {
-      for (int& i : t) {
-        if (place[i] < 0) {
-          place[i] = static_cast<int>(piece.points.size());
-          piece.points.push_back(mesh.points[i]);
-        }
-        i = place[i];
-      }
-      piece.triangles.push_back(t);
-    }
-    out.push_back(std::move(piece));
-  }
+  out.reserve(order.size());
+  for (const auto& [size, k] : order) out.push_back(with_own_points(mesh, pieces[k], place));
   return out;
 }
 

@@ -20,6 +20,7 @@
 #include "io/mesh_file.h"
 #include "io/shape_file.h"
 #include "nurbs/affine.h"
+#include "nurbs/gauss_rule.h"
 #include "shapes/primitives.h"
 #include "shapes/random_pebble.h"
 #include "shapes/revolved.h"
@@ -656,18 +657,14 @@ void print_mass(const Shape& shape) {
 
 double surface_area(const Shape& shape) {  // by Gauss's rule of four points on a grid of cells
   constexpr int kGrid = 12;
-  constexpr double kNode[] = {-0.8611363115940526, -0.3399810435848563, 0.3399810435848563,
-                              0.8611363115940526};
-  constexpr double kWeight[] = {0.3478548451374538, 0.6521451548625461, 0.6521451548625461,
-                                0.3478548451374538};
+  const GaussRule rule = gauss_rule(4);
   double area = 0;
   for (const BezierPatch& patch : shape.patches)
     for (int i = 0; i < 4 * kGrid; ++i)
       for (int j = 0; j < 4 * kGrid; ++j) {
-        const double u = (i / 4 + 0.5 + 0.5 * kNode[i % 4]) / kGrid,
-                     v = (j / 4 + 0.5 + 0.5 * kNode[j % 4]) / kGrid;
-        const Jet1 s = evaluate1(patch, u, v);
-        area += s.su.cross(s.sv).norm() * kWeight[i % 4] * kWeight[j % 4] / (4 * kGrid * kGrid);
+        const Jet1 s =
+            evaluate1(patch, (i / 4 + rule.nodes[i % 4]) / kGrid, (j / 4 + rule.nodes[j % 4]) / kGrid);
+        area += s.su.cross(s.sv).norm() * rule.weights[i % 4] * rule.weights[j % 4] / (kGrid * kGrid);
       }
   return area;
 }

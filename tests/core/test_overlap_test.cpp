@@ -10,18 +10,11 @@
 namespace nurbs::test_overlap_test {
 namespace {
 
-using families::Kind;
-using families::kKinds;
-using families::solids_of;
+using families::any_solid;
 using test::Random;
 using test::Solid;
 
 constexpr double kTolerance = 1e-6;
-
-const Solid& any_solid(Random& random) {
-  const std::vector<Solid>& solids = solids_of(static_cast<Kind>(random.below(kKinds)));
-  return solids[random.below(static_cast<int>(solids.size()))];
-}
 
 // B stands off A by `gap` times the smaller radius along n, which separates them where that is above 0.
 void place_beside(const Solid& sa, const Solid& sb, Random& random, double gap, Particle* a, Particle* b) {

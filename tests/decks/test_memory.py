@@ -50,6 +50,17 @@ run 1
 """
 
 
+HERTZ = "model hertz tangential history"
+MATERIAL = models.materials({"youngsModulus": 5e7, "poissonsRatio": 0.3, "coefficientRestitution": 0.5, "coefficientFriction": 0.3},
+                            types=1)
+FLOOR = meshes.ascii_stl([(-1, -1, 0), (1, -1, 0), (1, 1, 0), (-1, 1, 0)], [(0, 1, 2), (0, 2, 3)])
+MESH = f"fix m all mesh/surface file floor.stl type 1\nfix w all wall/nurbs mesh m type 1 {HERTZ}"
+
+
+def hertz_force(radius, overlap):
+    return 4 / 3 * 5e7 / (2 * (1 - 0.3**2)) * radius**0.5 * overlap**1.5
+
+
 class Size(unittest.TestCase):
     def gaps(self, apart, height, change):
         atoms = [(1, 1, 1, 1.0, 1000.0, 0.0, 0.0, height, 1.0, 0.0, 0.0, 0.0),
@@ -83,34 +94,21 @@ class Size(unittest.TestCase):
 
     def test_a_resized_body_has_its_own_effective_radius(self):
         """Hertz's force of a ball held down on a wall and on another ball is that of its new radius at once."""
-        law = "model hertz tangential history"
-        modulus = 5e7 / (2 * (1 - 0.3**2))
-        floor = meshes.ascii_stl([(-1, -1, 0), (1, -1, 0), (1, 1, 0), (-1, 1, 0)], [(0, 1, 2), (0, 2, 3)])
-        for wall in (f"fix w all wall/nurbs plane 0 0 0 0 0 1 type 1 {law}",
-                     f"fix m all mesh/surface file floor.stl type 1\nfix w all wall/nurbs mesh m type 1 {law}", ""):
+        for wall in (f"fix w all wall/nurbs plane 0 0 0 0 0 1 type 1 {HERTZ}", MESH, ""):
             held = [(k + 1, 1, 1, 0.1, 2500.0, 0.0, 0.0, 0.099 + 0.198 * k, 1.0, 0.0, 0.0, 0.0) for k in range(1 if wall else 2)]
-            text = HELD.format(law=law, wall=wall, materials=models.materials(
-                {"youngsModulus": 5e7, "poissonsRatio": 0.3, "coefficientRestitution": 0.5, "coefficientFriction": 0.3}, types=1))
-            run = deck.run_ok(text, files={"ball.json": deck.shape_file("sphere", 1), "balls.data": deck.data_file(held), "floor.stl": floor})
-            overlap, radius = (0.011, 0.11) if wall else (0.022, 0.055)
-            force = 4 / 3 * modulus * radius**0.5 * overlap**1.5
+            text = HELD.format(law=HERTZ, wall=wall, materials=MATERIAL)
+            run = deck.run_ok(text, files={"ball.json": deck.shape_file("sphere", 1), "balls.data": deck.data_file(held), "floor.stl": FLOOR})
+            force = hertz_force(0.11, 0.011) if wall else hertz_force(0.055, 0.022)
             self.assertAlmostEqual(run.thermo["f"][-1], force, delta=1e-6 * force, msg=wall)
 
     def test_a_wall_learns_of_a_size_changed_on_the_way(self):
         """So it is where the contact has come from a restart or another rank before the run that follows."""
-        law = "model hertz tangential history"
-        material = models.materials({"youngsModulus": 5e7, "poissonsRatio": 0.3, "coefficientRestitution": 0.5,
-                                     "coefficientFriction": 0.3}, types=1)
-        modulus, overlap = 5e7 / (2 * (1 - 0.3**2)), 0.011
-        files = {"ball.json": deck.shape_file("sphere", 1),
-                 "floor.stl": meshes.ascii_stl([(-1, -1, 0), (1, -1, 0), (1, 1, 0), (-1, 1, 0)], [(0, 1, 2), (0, 2, 3)]),
+        files = {"ball.json": deck.shape_file("sphere", 1), "floor.stl": FLOOR,
                  "balls.data": deck.data_file([(1, 1, 1, 0.1, 2500.0, 0.0, 0.0, 0.099, 1.0, 0.0, 0.0, 0.0)])}
-        force = 4 / 3 * modulus * 0.11**0.5 * overlap**1.5  # a cylinder's too, as between LIGGGHTS's own
-        for name, wall in (
-                ("mesh", f"fix m all mesh/surface file floor.stl type 1\nfix w all wall/nurbs mesh m type 1 {law}"),
-                ("plane", f"fix w all wall/nurbs plane 0 0 0 0 0 1 type 1 {law} move linear 0 0 0"),
-                ("cylinder", f"fix w all wall/nurbs cylinder y 1 0 1 type 1 {law}")):
-            text = HELD.format(law=law, wall=wall, materials=material)
+        force = hertz_force(0.11, 0.011)  # a cylinder's too, as between LIGGGHTS's own
+        for name, wall in (("mesh", MESH), ("plane", f"fix w all wall/nurbs plane 0 0 0 0 0 1 type 1 {HERTZ} move linear 0 0 0"),
+                           ("cylinder", f"fix w all wall/nurbs cylinder y 1 0 1 type 1 {HERTZ}")):
+            text = HELD.format(law=HERTZ, wall=wall, materials=MATERIAL)
             first, last = text.split("set group")
             half = deck.run_ok(first + "write_restart half.restart\n", files=files)
             restart = text.replace("read_data balls.data", "read_restart half.restart").replace("run 100\n", "")

@@ -55,7 +55,7 @@ const Solid& any_of(Kind kind, Random& random) {
 const Solid& partner(Kind kind, Random& random) {
   const int which = random.below(4);
   if (which == 0) return unit_ball();
-  return any_of(which == 1 ? static_cast<Kind>(random.below(kKinds)) : kind, random);
+  return which == 1 ? any_solid(random) : any_of(kind, random);
 }
 
 // Directions that matter: any, of a face, along the support of a vertex, and next to those.
@@ -376,6 +376,10 @@ const std::vector<Solid>& solids_of(Kind kind) {
   Random random(1000 + static_cast<int>(kind));
   for (int k = 0; k < kBodies; ++k) solids.push_back(make_solid(kind, random, k));
   return solids;
+}
+
+const Solid& any_solid(Random& random) {
+  return any_of(static_cast<Kind>(random.below(kKinds)), random);
 }
 
 const std::vector<Family>& solid_families() {

@@ -14,6 +14,8 @@ namespace nurbs::families {
 enum class Kind { cone, cylinder, capsule, lens, polyhedron };
 constexpr int kKinds = 5;
 const std::vector<test::Solid>& solids_of(Kind kind);
+// One of them, of any kind.
+const test::Solid& any_solid(test::Random& random);
 
 const std::vector<Family>& solid_families();
 
