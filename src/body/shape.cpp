@@ -354,6 +354,7 @@ void build(Draft& draft, const std::optional<Mat3>& gyration) {
   if (gyration) check_size(draft.shape);
   draft.shape.stamp = content_stamp(draft.shape);
   draft.shape.flats = find_flat_features(draft.shape);
+  draft.shape.core.edges = find_core_edges(draft.shape);
 }
 
 }  // namespace

@@ -13,9 +13,21 @@ struct Shape;
 // Lengths of the shape frame. For every unit d the body's support is max over points of d . x, and `radius`
 // more, within `error`.
 struct SpheroPolyhedron {
+  // Where the ball rolls along an edge of the hull: its surface is straight from one end's ball to the
+  // other's, with normals on an arc of less than half a circle.
+  struct Edge {
+    int ends[2];
+    Vec3 along;     // unit; round it from `from` to `to` is right-handed
+    Vec3 from, to;  // normals, unit, at the arc's ends
+  };
+
   std::vector<Vec3> points;  // none: the body is no such one, or isn't known to be
   double radius = 0;
   double error = 0;
+  std::vector<Edge> edges;  // all, parts of one arc each; none of a body whose straight lines aren't known
+
+  // Whether these tell all that is known of straight lines.
+  bool has_lines(bool ruled) const { return found() && (!ruled || !edges.empty()); }
 
   bool found() const { return !points.empty(); }
   // The number of the point that is farthest along d, of any length; the first of equal ones.
@@ -29,9 +41,14 @@ struct SpheroPolyhedron {
 };
 
 template <class Archive>
+void archive(Archive& a, SpheroPolyhedron::Edge& s) {
+  auto& [ends, along, from, to] = s;
+  a(ends, along, from, to);
+}
+template <class Archive>
 void archive(Archive& a, SpheroPolyhedron& s) {
-  auto& [points, radius, error] = s;
-  a(points, radius, error);
+  auto& [points, radius, error, edges] = s;
+  a(points, radius, error, edges);
 }
 
 // Of a shape of which all but the search tables is done. Found by positions:
@@ -46,6 +63,10 @@ void archive(Archive& a, SpheroPolyhedron& s) {
 // round-off, the balls, smaller by `error`, are proven to lie inside instead. Polyhedra: bilinear patches,
 // whose corners are of the body and have it in their hull.
 SpheroPolyhedron find_sphero_polyhedron(const Shape& shape);
+
+// Its edges, of a shape whose flat features are known: the straight lines of constant normal, through all
+// patches that are none of a ball's or a face's. None unless every such patch has its place, with `radius`.
+std::vector<SpheroPolyhedron::Edge> find_core_edges(const Shape& shape);
 
 // Hulls of a few balls of different radii, as tapered capsules are; the tip of a cone is a ball of radius 0.
 // For every unit d the body's support is max over balls of d . centre + radius, within `error`. Lengths of

@@ -15,6 +15,7 @@ namespace nurbs {
 namespace {
 
 constexpr double kFanSafety = 1.1;  // sines of slopes stand for angles
+constexpr double kTopError = 10;    // times kFeatureSupport
 
 // The end of edge `edge` in patch parameters, and which parameter is pinned on it.
 bool pins_u(int edge) {
@@ -428,6 +429,27 @@ Support find_hull_support(const Shape& shape, const Vec3& d, const SurfacePoint*
 
 Support find_feature_support(const Shape& shape, const Vec3& d, const SurfacePoint* start) {
   return find_hull_support(shape, d, start, kFeatureSupport * shape.bounding_radius);
+}
+
+Support core_support(const Shape& shape, const Vec3& d) {
+  const SpheroPolyhedron& core = shape.core;
+  Support s;
+  s.where = {-1, 0, 0};
+  s.point = core.points[core.support(d)] + core.radius * d;
+  s.normal = d;
+  s.h = d.dot(s.point);
+  s.upper = s.h + core.error + kRoundoff * shape.bounding_radius;
+  s.slope = 0;
+  s.iterations = 1;
+  s.converged = true;
+  return s;
+}
+
+Support find_feature_top(const Shape& shape, const Vec3& d, const SurfacePoint* start) {
+  const SpheroPolyhedron& core = shape.core;
+  const bool known = core.has_lines(!shape.flats.ruling.empty()) &&
+                     core.error <= kTopError * kFeatureSupport * shape.bounding_radius;
+  return known ? core_support(shape, d) : find_feature_support(shape, d, start);
 }
 
 Support search_all_patches(const Shape& shape, const Vec3& d, const SurfacePoint& at) {

@@ -81,10 +81,31 @@ bool ends_ruling(const Shape& shape, const EdgeLink& link) {
          (link.edge == end_edge(ruling, false) || link.edge == end_edge(ruling, true));
 }
 
+// Calls visit(line) for the lines of a sphero-polyhedron that end at the ball which has the support along d,
+// each where its normal is nearest to d, and no further away than the angle.
+template <class Visit>
+void each_core_line(const SpheroPolyhedron& core, const Vec3& d, double angle, Visit visit) {
+  const int top = core.support(d);
+  const double least = std::cos(angle);
+  for (const SpheroPolyhedron::Edge& edge : core.edges) {
+    if (edge.ends[0] != top && edge.ends[1] != top) continue;
+    const Vec3 round = edge.along.cross(d);  // square to both
+    Vec3 normal;
+    if (round.dot(edge.from) <= 0 && round.dot(edge.to) >= 0 && round.squaredNorm() > 0)
+      normal = round.cross(edge.along).normalized();
+    else
+      normal = d.dot(edge.from) > d.dot(edge.to) ? edge.from : edge.to;
+    if (!(normal.dot(d) >= least)) continue;
+    visit(RuledLine{{core.points[edge.ends[0]] + core.radius * normal,
+                     core.points[edge.ends[1]] + core.radius * normal}});
+  }
+}
+
 // Calls visit(line) for the ruled lines through a surface point and beside it.
 template <class Visit>
 void each_line(const Shape& shape, const SurfacePoint& at, const Vec3& d, double angle, Visit visit) {
   if (shape.flats.ruling.empty()) return;
+  if (!shape.core.edges.empty()) return each_core_line(shape.core, d, angle, visit);
   const auto try_at = [&](const SurfacePoint& place) {
     RuledLine line;
     if (line_through(shape, place, d, angle, &line)) visit(line);
@@ -123,7 +144,7 @@ double turn_to_ruled_line(const Shape& shape, const SurfacePoint& where, const V
 
 SupportSet support_set(const Shape& shape, const Vec3& d, double tolerance) {
   const FlatFeatures& flats = shape.flats;
-  const Support support = find_feature_support(shape, d);
+  const Support support = find_feature_top(shape, d);
   SupportSet set;
   set.where = support.where;
   set.h = support.h;

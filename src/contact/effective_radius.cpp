@@ -20,6 +20,26 @@ SurfaceCurvature ellipsoid_curvature(const Particle& particle, const Vec3& outwa
   return {h / particle.scale * (across * m * across), true};
 }
 
+// Of a sphero-polyhedron where its normal is n: as bent as the ball but along the core's points that are
+// level there.
+SurfaceCurvature core_curvature(const Particle& particle, const Vec3& outward) {
+  constexpr double kLevel = 1e-8;  // of the distance to the highest of them
+  const SpheroPolyhedron& core = particle.shape->core;
+  const Vec3 n = particle.q.conjugate() * outward;
+  const Vec3& top = core.points[core.support(n)];
+  Vec3 along = Vec3::Zero();
+  for (const Vec3& x : core.points) {
+    const Vec3 way = x - top;
+    const double length = way.norm();
+    if (length == 0 || n.dot(way) < -kLevel * length) continue;
+    if (along.cross(way).norm() > kLevel * length) return plane_curvature();
+    along = way / length;
+  }
+  const Vec3 axis = particle.q * along;
+  const Mat3 across = Mat3::Identity() - outward * outward.transpose() - axis * axis.transpose();
+  return {across / (particle.scale * core.radius), true};
+}
+
 // Squared angle (rad) within which a contact's normal is a flat face's, with the errors of searches.
 constexpr double kFaceAngle2 = 1e-4 * 1e-4;
 
@@ -32,7 +52,8 @@ bool meets_face(const Particle& particle, const Vec3& outward, double angle2) {
 // frame.
 SurfaceCurvature curvature_of_patch(const Particle& particle, const PointMemory& point, const Vec3& outward) {
   if (!(point.patch >= 0) && particle.shape->ellipsoid.found) return ellipsoid_curvature(particle, outward);
-  if (!(point.patch >= 0)) {  // solved as a sphere, or not at all
+  if (!(point.patch >= 0)) {  // solved as a sphere or by its core, or not at all
+    if (particle.shape->core.radius > 0) return core_curvature(particle, outward);
     const Roundness round = roundness(*particle.shape);
     if (!(round.slope * round.slope < kCreaseAngle2)) return {};
     return {(Mat3::Identity() - outward * outward.transpose()) / (particle.scale * round.radius), true};

@@ -39,7 +39,7 @@ inline void drop_model(LocalModel* model) {
 }
 
 // Whether something else stands in a model's place, which its `unique` then says: kDeepProof (deep_search.h),
-// kEllipsoidPair (ellipsoid_search.h), kBridge (bridge_search.h).
+// kEllipsoidPair (ellipsoid_search.h), kCorePair (core_search.h), kBridge (bridge_search.h).
 inline bool is_mark(double unique) {
   return unique < 0 && std::isfinite(unique);
 }

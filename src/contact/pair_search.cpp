@@ -7,6 +7,7 @@
 
 #include "body/locate_point.h"
 #include "contact/bridge_search.h"
+#include "contact/core_search.h"
 #include "contact/crease_search.h"
 #include "contact/dents.h"
 #include "contact/direction_search.h"
@@ -77,8 +78,9 @@ class Ladder {
     if (solve_ellipsoids(a_, b_, settings_, memory_, r)) return;
     const bool touched = memory_.proof.contact != 0;
     const PairFrame pair(a_, b_);
-    if (!touched && bounds(pair, r)) return;
     const double tolerance = std::max(settings_.tolerance * pair.size, kLeastTolerance * pair.reach);
+    if (solve_cores(pair, tolerance, a_, b_, settings_, memory_, r)) return;
+    if (!touched && bounds(pair, r)) return;
     if (memory_.on_a.patch >= 0 && warm(pair, tolerance, r)) return;
     if (touched && bounds(pair, r)) return;
     *r = cold(pair, tolerance, r->iterations);

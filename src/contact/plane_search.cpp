@@ -5,6 +5,7 @@
 
 #include "contact/certificate.h"
 #include "contact/ellipsoid_search.h"
+#include "contact/pair_frame.h"
 #include "contact/pair_memory.h"
 #include "contact/pair_search.h"
 #include "contact/sphere_search.h"
@@ -93,6 +94,7 @@ class PlaneLadder {
     const bool touched = memory_.proof.contact != 0;
     axes_ = particle_.q.toRotationMatrix();
     d_ = axes_.transpose() * -normal_;
+    if (by_core(r)) return;
     if (!touched && bounds(r)) return;
     if (memory_.on_b.patch >= 0 && warm(r)) return;
     if (touched && bounds(r)) return;
@@ -141,6 +143,15 @@ class PlaneLadder {
     const double turned2_before = turned2(particle_.q, memory_.proof.q_b);
     finish(s.support, s.attained, r);
     if (r->status == Status::converged) remember_model(s, turned2_before, r->gap);
+    return true;
+  }
+
+  // Sphero-polyhedra in closed form.
+  bool by_core(ContactResult* r) {
+    if (!PairFrame::is_swept(shape_, particle_.scale, tolerance_)) return false;
+    const Support s = core_support(shape_, d_);
+    r->rung = Rung::local_model;
+    finish(s, 2 * s.h - s.upper, r);
     return true;
   }
 

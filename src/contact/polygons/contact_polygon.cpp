@@ -115,7 +115,7 @@ double support_gap(const ContactPolygon& polygon, const Particle* a, const Parti
   if (reference) outward = reference->q * outward;
   const Vec3 apart = incident.x - (reference ? reference->x : origin);
   const double level = (reference ? reference->scale : 1) * polygon.offset;
-  const double h = find_feature_support(*incident.shape, incident.q.conjugate() * -outward).h;
+  const double h = find_feature_top(*incident.shape, incident.q.conjugate() * -outward).h;
   return outward.dot(apart) - incident.scale * h - level;
 }
 

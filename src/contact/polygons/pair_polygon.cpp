@@ -42,7 +42,7 @@ class FaceContact {
     const Vec3& node = shape.atlas.point[shape.atlas.nearest(down())];
     const double least = -plane_.height(incident_.place(node));
     if (least > most) return least;
-    const double h = find_feature_support(shape, down()).h;
+    const double h = find_feature_top(shape, down()).h;
     return plane_.level - (plane_.normal.dot(incident_.frame.x - plane_.origin) - incident_.frame.scale * h);
   }
 
@@ -284,7 +284,7 @@ class FaceContact {
   bool incident_line(RuledLine* line, Support* support) const {
     const Shape& shape = *incident_.shape;
     if (shape.flats.ruling.empty()) return false;
-    *support = find_feature_support(shape, down());
+    *support = find_feature_top(shape, down());
     return ruled_line(shape, support->where, down(), kLineAngle, line);
   }
 
@@ -370,8 +370,8 @@ Vec3 least_across(const Body& a, const Body& b, const Vec3& u, const Vec3& d) {
   const double size = a.radius() + b.radius();
   const auto along = [&](double angle) -> Vec3 { return std::cos(angle) * middle + std::sin(angle) * side; };
   const auto slope = [&](double angle) {  // of the overlap
-    const Vec3 e = along(angle), x = a.place(find_feature_support(*a.shape, a.turned_back(e)).point),
-               y = b.place(find_feature_support(*b.shape, b.turned_back(-e)).point);
+    const Vec3 e = along(angle), x = a.place(find_feature_top(*a.shape, a.turned_back(e)).point),
+               y = b.place(find_feature_top(*b.shape, b.turned_back(-e)).point);
     return (x - y).dot(u.cross(e));
   };
   double last = 0, at_last = slope(last), angle = std::clamp(-at_last / size, -kMostAcross, kMostAcross);
@@ -401,7 +401,7 @@ bool line_contact(const Body& a, const Body& b, Vec3 d, double overlap, double r
   // Both bodies need a feature that lags no more than that behind their support.
   const auto lag = [](const Body& body, const Vec3& along, const SurfacePoint* start) {
     const Vec3 on_body = body.turned_back(along);
-    const Support top = find_feature_support(*body.shape, on_body, start);
+    const Support top = find_feature_top(*body.shape, on_body, start);
     return body.frame.scale * feature_lag(*body.shape, on_body, top.h, top.where);
   };
   const FlatFeatures &flats_a = a.shape->flats, &flats_b = b.shape->flats;
