@@ -25,12 +25,13 @@ struct ContactRecord {
   double torque[3];        // of the law beside its force, on B, lab axes
   double weight;           // share of the pair's stiffness that this contact has
   double flat;             // 0: the pair's only contact is this one; else its contacts are those of a polygon
+  double shift;            // length of the overlap in which it is not felt
 };
-constexpr int kContactSize = kLocalModelSize + 10 + kContactStateSize + 5;
+constexpr int kContactSize = kLocalModelSize + 10 + kContactStateSize + 6;
 static_assert(sizeof(ContactRecord) == kContactSize * sizeof(double));
 constexpr int kStateField = kLocalModelSize + 10;
 
-constexpr int kWeight = kContactSize - 2, kFlat = kContactSize - 1;
+constexpr int kWeight = kContactSize - 3, kFlat = kContactSize - 2, kShift = kContactSize - 1;
 
 constexpr int kBlock = 8;
 
@@ -70,6 +71,7 @@ struct FlatRecord {  // as it travels
   ContactState state[kBlock];
 };
 constexpr int kFlatSize = sizeof(FlatRecord) / sizeof(double);
+constexpr int kWithShifts = 1 << 16;  // in a packed record's `flat`, see ContactPool::pack
 constexpr int kMostContactSize = kContactSize + kFlatSize + (1 + kBlock) * kMostModelMemory;
 static_assert(kContactPoints <= kBlock && sizeof(FlatRecord) % sizeof(double) == 0);
 
@@ -162,13 +164,14 @@ class ContactPool {
 
   // A contact with all that hangs on it as plain doubles, at most kMostContactSize of them: how many. And
   // back: a new contact, and how many doubles it took. Its field `flat` then says what follows: 1 for a
-  // polygon, and twice the doubles of a model's memory. Another model's memory is not taken.
+  // polygon, twice the doubles of a model's memory, and kWithShifts, without which (as restarts once were) a
+  // record ends with it and a polygon without its shift. Another model's memory is not taken.
   int pack(std::int32_t number, double* to) const {
     ContactRecord record;
     const ContactBlock& from = blocks_[(number - 1) / kBlock];
     from.get(lane(number), 0, kContactSize, &record);
     const int index = static_cast<int>(record.flat);
-    record.flat = (index != 0 ? 1 : 0) + 2 * memory_size_;
+    record.flat = (index != 0 ? 1 : 0) + 2 * memory_size_ + kWithShifts;
     std::memcpy(to, &record, sizeof record);
     int size = kContactSize;
     const auto put = [&](const void* values, int count) {
@@ -191,11 +194,13 @@ class ContactPool {
   }
   std::int32_t unpack(const double* from, int* size) {
     ContactRecord record;
-    std::memcpy(&record, from, sizeof record);
-    const int follows = static_cast<int>(record.flat), memory_size = follows / 2;
+    std::memcpy(&record, from, sizeof record - sizeof record.shift);
+    const bool shifts = record.flat >= kWithShifts;
+    const int follows = static_cast<int>(record.flat) % kWithShifts, memory_size = follows / 2;
+    *size = shifts ? kContactSize : kContactSize - 1;
+    record.shift = shifts ? from[kShift] : 0;
     record.flat = 0;
     const std::int32_t number = add(record);
-    *size = kContactSize;
     const auto get_memory = [&](ContactBlock& to, int lane, int count) {
       if (memory_size == memory_size_ && memory_size != 0)
         std::copy_n(from + *size, count * memory_size, memory(to, lane));
@@ -203,9 +208,11 @@ class ContactPool {
     };
     get_memory(block(number), lane(number), 1);
     if (follows % 2 == 0) return number;
-    FlatRecord points;
-    std::memcpy(&points, from + *size, sizeof points);
-    *size += kFlatSize;
+    FlatRecord points{};
+    const int shift = shifts ? 1 : 0, polygon = sizeof points.polygon / sizeof(double) - 1 + shift;
+    std::memcpy(static_cast<void*>(&points.polygon), from + *size, polygon * sizeof(double));
+    std::memcpy(points.state, from + *size + polygon, sizeof points.state);
+    *size += kFlatSize - 1 + shift;
     FlatContact& flat = add_flat(number);
     flat.polygon = points.polygon;
     flat.points.used = (1u << points.polygon.count) - 1;

@@ -46,6 +46,7 @@ struct alignas(64) ContactStages::Results {
   double gap[kBlock], lower[kBlock];
   double normal[3][kBlock], point[3][kBlock], offset[3][kBlock];  // point: midpoint of the two
   double touching[kBlock] = {};                                   // 1 or 0
+  double shift[kBlock] = {};                                      // overlap that isn't felt, length
   double together[kBlock] = {};  // of a polygon's points: the weights of those that bear, summed
   double served[kBlock] = {};
   int iterations[kBlock] = {};  // of those served by Newton
@@ -68,7 +69,7 @@ struct alignas(64) ContactStages::Results {
   Vec3 offset_of(int lane) const { return {offset[0][lane], offset[1][lane], offset[2][lane]}; }
   ContactGeometry geometry(int lane) const {
     const Vec3 middle(point[0][lane], point[1][lane], point[2][lane]);
-    return {-gap[lane], normal_of(lane), middle, middle - offset_of(lane)};
+    return {-gap[lane] - shift[lane], normal_of(lane), middle, middle - offset_of(lane)};
   }
 };
 

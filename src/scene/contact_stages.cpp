@@ -271,7 +271,7 @@ void ContactStages::look(int k) {
     if (has_proof(proof)) expiry_[k] = expiry(k, r.lower);
     return;
   }
-  ContactRecord record{memory.model, memory.on_a, memory.on_b, {}, {0, 0, 0}, 1, 0};
+  ContactRecord record{memory.model, memory.on_a, memory.on_b, {}, {0, 0, 0}, 1, 0, 0};
   proof.contact = pool_.add(record);
   bind_neighbour(k);
   set_law(k);
@@ -492,6 +492,7 @@ void ContactStages::compute_block(ContactBlock& block) {
       solve_lane(block, lane, results);
     }
     if (left.any) settle_left(block, lane, results, left);
+    stand_off(block, lane, results);
     if (step_.setup) {
       const bool first = results.touching[lane] != 0 && block.field[kStateField][lane] == 0;
       if (first && may_be_flat(a, b) && make_flat(block, lane, results)) continue;
@@ -500,7 +501,7 @@ void ContactStages::compute_block(ContactBlock& block) {
       continue;
     }
     if (results.touching[lane] != 0) {
-      relax_weight(block, lane, results.gap[lane]);
+      relax_single(block, lane, results);
       if (may_be_flat(a, b) && make_flat(block, lane, results)) {
         results.touching[lane] = 0;
         continue;
@@ -647,7 +648,7 @@ void ContactStages::apply_law(ContactBlock& block, int first, const Results& res
   law.ct *= dampers;
   const BodyMotionOf<Wide> a = gather_motion(of_a), b = gather_motion(of_b);
   ContactGeometryOf<Wide> g;
-  g.overlap = zero - got(results.gap);
+  g.overlap = zero - got(results.gap) - got(results.shift);
   g.normal = {got(results.normal[0]), got(results.normal[1]), got(results.normal[2])};
   g.arm_a = {got(results.point[0]), got(results.point[1]), got(results.point[2])};
   g.arm_b = g.arm_a - Triple<Wide>{got(results.offset[0]), got(results.offset[1]), got(results.offset[2])};
@@ -732,8 +733,9 @@ ContactView ContactStages::view(const ContactBlock& block, int lane) const {
   const int a = block.a[lane], b = block.b[lane];
   ContactView v{a, b, share(a, b), block.proof[lane], coefficients(block, lane), {}, Vec3::Zero(), {}};
   block.get(lane, kStateField, kContactStateSize, &v.state);
+  if (step_.model == nullptr) v.stored = stored_energy(v.law, v.state);
+  v.state.overlap += block.field[kShift][lane];
   if (step_.model == nullptr) {
-    v.stored = stored_energy(v.law, v.state);
     if (block.field[kWeight][lane] < 0) {
       v.stored.normal_spring = -v.stored.normal_spring;
       v.stored.tangential_spring = -v.stored.tangential_spring;

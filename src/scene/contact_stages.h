@@ -336,8 +336,10 @@ class ContactStages {
                          double overlap);
   void settle_left(ContactBlock& block, int lane, Results& results, const LeftPolygon& left);
   double arrived(double more, int a, int b, const Vec3& normal, const Vec3& arm_a, const Vec3& arm_b) const;
-  void relax_factor(const ContactBlock& block, int lane, FlatContact& flat, const PolygonState& state);
-  void relax_weight(ContactBlock& block, int lane, double gap);
+  void relax_polygon(const ContactBlock& block, int lane, FlatContact& flat, PolygonState* state);
+  PolygonState give(ContactPolygon* polygon, int a, int b, double energy) const;
+  void stand_off(ContactBlock& block, int lane, Results& results);
+  void relax_single(ContactBlock& block, int lane, Results& results);
   void book(double energy, int a, int b);
   void add_load(int body, const double* load);
 

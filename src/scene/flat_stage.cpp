@@ -12,6 +12,7 @@ namespace {
 
 constexpr double kSameNormal = 0.99;  // cosine between a contact's normals of two steps: 8 degrees
 constexpr double kFewDigits = 1e-8;   // of the bounding radius
+constexpr double kNoShift = 1e-12;    // of it: as good as 0
 
 BodyFrame frame_of(const BodyRecord& r, double scale, const Shape* shape) {
   BodyFrame f;
@@ -28,6 +29,7 @@ void fill(const ContactPolygon& polygon, const PolygonState& state, const Vec3& 
   for (int k = 0; k < kBlock; ++k) {
     const bool there = k < state.count;
     points->field[kWeight][k] = there ? polygon.factor * polygon.weight[k] : 0;
+    points->field[kShift][k] = polygon.shift;
     results->gap[k] = results->lower[k] = there ? state.gap[k] : 1;
     results->touching[k] = there && state.gap[k] < 0;
     for (int i = 0; i < 3; ++i) {
@@ -75,6 +77,15 @@ double ContactStages::clear_way(int a, int b, double* until) const {
   const Vec3 velocity = load(rb.velocity) - load(ra.velocity) - spin_a.cross(offset(a, b));
   *until -= step_.dt * (velocity.norm() + rb.radius * (spin_b - spin_a).norm());
   return 0;
+}
+
+// The energy U / kn to a polygon, by its factor or its shift; its state then.
+PolygonState ContactStages::give(ContactPolygon* polygon, int a, int b, double energy) const {
+  const BodyArrays& arrays = step_.bodies->arrays();
+  const auto frame = [&](int i) {
+    return frame_of(record(i), arrays.scale[i], arrays.shapes[arrays.shape[i]]);
+  };
+  return give_energy(energy, kStiffest, a < 0 ? plane_frame(wall_frame(a)) : frame(a), frame(b), polygon);
 }
 
 // Energy that left the springs.
@@ -129,7 +140,8 @@ bool ContactStages::make_flat(ContactBlock& block, int lane, const Results& sing
   const Vec3 normal = single.normal_of(lane);
   double before[3];
   block.get(lane, kStateField + 3, 3, before);
-  const double overlap = -single.gap[lane], last_overlap = block.field[kStateField + 2][lane];
+  const double overlap = -single.gap[lane],
+               last_overlap = block.field[kStateField + 2][lane] + single.shift[lane];
   const double way = clear_way(a, b, &block.until[lane]);
   block.until[lane] -= kClearTurn * smaller_radius(a, b) * (normal - load(before)).norm();
   if (a >= 0) block.until[lane] -= kClearGrowth * std::abs(overlap - last_overlap);
@@ -146,16 +158,23 @@ bool ContactStages::make_flat(ContactBlock& block, int lane, const Results& sing
     block.until[lane] = way + clear;
     return false;
   }
-  const PolygonState state = now(polygon, *step_.bodies, wall_frame(a), a, b);
+  PolygonState state = now(polygon, *step_.bodies, wall_frame(a), a, b);
   if (!(state.energy > 0)) return false;
-  const double weight = block.field[kWeight][lane];
-  polygon.factor = continuity_factor(0.5 * weight * overlap * overlap, polygon, state);
+  const double weight = block.field[kWeight][lane], felt = overlap - single.shift[lane];
+  if (a >= -1)
+    state = give(&polygon, a, b, 0.5 * weight * felt * felt);
+  else
+    polygon.factor = continuity_factor(0.5 * weight * felt * felt, polygon, state);
   if (!(polygon.factor < kStiffest)) return false;
 
   ContactState old;
   block.get(lane, kStateField, kContactStateSize, &old);
   // A contact that begins with an overlap of a few digits holds nothing, and the ratio is round-off's.
-  if (old.active == 0 && overlap < kFewDigits * record(b).radius) polygon.factor = 1;
+  if (old.active == 0 && single.shift[lane] == 0 && overlap < kFewDigits * record(b).radius) {
+    polygon.factor = 1;
+    polygon.shift = 0;
+    state = now(polygon, *step_.bodies, wall_frame(a), a, b);
+  }
   FlatContact& flat = pool_.add_flat(block.proof[lane]->contact);
   flat.polygon = polygon;
   flat.points.used = (1u << polygon.count) - 1;
@@ -183,6 +202,7 @@ bool ContactStages::make_flat(ContactBlock& block, int lane, const Results& sing
   const ContactState none{};
   block.set(lane, kStateField, kContactStateSize, &none);
   block.field[kWeight][lane] = 1;
+  block.field[kShift][lane] = 0;
   counts_.value[ContactCounts::contacts] -= share(a, b) * single.touching[lane];  // its points count
   run_flat(block, lane, flat, state);
   return true;
@@ -206,6 +226,7 @@ void ContactStages::forget_flat(ContactBlock& block, int lane) {
   const ContactState none{};
   block.set(lane, kStateField, kContactStateSize, &none);
   block.field[kWeight][lane] = 1;
+  block.field[kShift][lane] = 0;
   block.until[lane] = 0;
 }
 
@@ -247,27 +268,36 @@ bool ContactStages::serve_flat(ContactBlock& block, int lane, LeftPolygon* left)
       return false;
     }
   }
-  if (!step_.setup && flat.polygon.factor != 1) relax_factor(block, lane, flat, state);
+  if (!step_.setup && (flat.polygon.factor != 1 || flat.polygon.shift != 0))
+    relax_polygon(block, lane, flat, &state);
   counts_.value[ContactCounts::local_model] += share(a, b);
   run_flat(block, lane, flat, state);
   return true;
 }
 
-// Towards the polygon's own stiffness; what the springs give up is booked.
-void ContactStages::relax_factor(const ContactBlock& block, int lane, FlatContact& flat,
-                                 const PolygonState& state) {
+// Towards the polygon's own stiffness and place; what the springs give up or get is booked.
+void ContactStages::relax_polygon(const ContactBlock& block, int lane, FlatContact& flat,
+                                  PolygonState* state) {
   const ContactCoefficients law =
       coefficients(block, lane);  // zeros where a model serves, which books itself
-  const ContactRest rest = rest_of(flat, state.count, record(block.a[lane]), record(block.b[lane]));
+  const ContactRest rest = rest_of(flat, state->count, record(block.a[lane]), record(block.b[lane]));
   if (!rest.rests) return;
+  double energy = 0;
+  if (flat.polygon.shift != 0) {
+    energy -= law.kn * stored_energy(flat.polygon, *state);
+    flat.polygon.shift *= 1 - kRelaxation * rest.phase;
+    if (flat.polygon.shift < kNoShift * record(block.b[lane]).radius) flat.polygon.shift = 0;
+    *state = now(flat.polygon, *step_.bodies, wall_frame(block.a[lane]), block.a[lane], block.b[lane]);
+    energy += law.kn * stored_energy(flat.polygon, *state);
+  }
   const double before = flat.polygon.factor;
   double tangential = 0;  // energy at factor 1
-  for (int k = 0; k < state.count; ++k) {
+  for (int k = 0; k < state->count; ++k) {
     ContactState point;
     flat.points.get(k, kStateField, kContactStateSize, &point);
     tangential += flat.polygon.weight[k] * stored_energy(law, point).tangential_spring;
   }
-  double energy = law.kn * relax(flat.polygon, state, kRelaxation * rest.phase);
+  energy += law.kn * relax(flat.polygon, *state, kRelaxation * rest.phase);
   energy += (flat.polygon.factor - before) * tangential;
   book(-energy, block.a[lane], block.b[lane]);
 }
@@ -287,9 +317,11 @@ bool ContactStages::remake(ContactBlock& block, int lane, FlatContact& flat, Pol
                            double overlap) {
   const int a = block.a[lane], b = block.b[lane];
   ContactPolygon polygon;
+  overlap += flat.polygon.shift;
   if (!find_polygon(a, b, state.normal, overlap, kKeptReach * overlap, &flat.polygon, &polygon)) return false;
   polygon.factor = flat.polygon.factor;
-  const PolygonState fresh = now(polygon, *step_.bodies, wall_frame(a), a, b);
+  polygon.shift = flat.polygon.shift;
+  PolygonState fresh = now(polygon, *step_.bodies, wall_frame(a), a, b);
   // Springs keep their energy; what would make them too stiff they lose, which is booked. An old line that
   // rolled has left the place where it bore.
   const double held = rolled_along(flat.polygon, polygon) ? energy_after_rolling(flat.polygon, polygon, fresh)
@@ -298,7 +330,9 @@ bool ContactStages::remake(ContactBlock& block, int lane, FlatContact& flat, Pol
   const int deepest = static_cast<int>(std::min_element(fresh.gap, fresh.gap + fresh.count) - fresh.gap);
   const double kept =
       held + arrived(holds - held, a, b, state.normal, fresh.arm_a[deepest], fresh.arm_b[deepest]);
-  if (holds > 0)
+  if (a >= -1)
+    fresh = give(&polygon, a, b, kept);
+  else if (holds > 0)
     polygon.factor = std::min(polygon.factor * kept / holds, std::max(kStiffest, polygon.factor));
   int source[kContactPoints];
   match(flat.polygon, state, polygon, fresh, source);
@@ -342,7 +376,7 @@ void ContactStages::run_flat(ContactBlock& block, int lane, FlatContact& flat, c
   Results results;
   fill(flat.polygon, state, offset(a, b), &flat.points, &results);
   flat.beyond = stored_energy(flat.polygon, state);
-  note_depth(a, b, state.least);
+  note_depth(a, b, state.least - flat.polygon.shift);
   for (int k = 0; k < state.count; ++k) {
     if (step_.setup)
       start_run(flat.points, k, results);
@@ -400,36 +434,68 @@ void ContactStages::settle_left(ContactBlock& block, int lane, Results& results,
     const ContactGeometry g = results.geometry(lane);
     held += kn * arrived((full - held) / kn, a, b, g.normal, g.arm_a, g.arm_b);
   }
-  double& weight = block.field[kWeight][lane];
-  weight = takes_over ? std::clamp(held / full, a < -1 ? kSoftest : 0, kStiffest) : 1;
+  double &weight = block.field[kWeight][lane], &shift = block.field[kShift][lane];
+  weight = takes_over ? std::clamp(held / full, a < -1 ? kSoftest : 1, kStiffest) : 1;
+  shift = results.shift[lane] =
+      takes_over && weight > held / full && a >= -1 ? -results.gap[lane] - std::sqrt(2 * held / kn) : 0;
   if (step_.model != nullptr) return;
   double energy = held + left.tangential_energy;
   ContactState single{};
   if (touching) {
     const ContactCoefficients own = scaled(step_.laws[block.law[lane]], weight);
-    take_over(own, results.geometry(lane), motion_of(record(a)), motion_of(record(b)), step_.dt, left.spring,
-              &single);
-    energy -= weight * full + stored_energy(own, single).tangential_spring;
+    // Springs that more of the stiffness is taken for gain nothing by it.
+    const double spring = 0.5 * own.kt * left.spring.squaredNorm();
+    const double share_of = spring > left.tangential_energy ? std::sqrt(left.tangential_energy / spring) : 1;
+    const ContactGeometry g = results.geometry(lane);
+    take_over(own, g, motion_of(record(a)), motion_of(record(b)), step_.dt, share_of * left.spring, &single);
+    energy -= 0.5 * own.kn * g.overlap * g.overlap + stored_energy(own, single).tangential_spring;
   }
   book(energy, a, b);
   block.set(lane, kStateField, kContactStateSize, &single);
 }
 
-// A contact that was left with more or less than its stiffness gets back to it, as a polygon does.
-void ContactStages::relax_weight(ContactBlock& block, int lane, double gap) {
-  double& weight = block.field[kWeight][lane];
-  if (weight == 1 || weight < 0) return;
-  if (block.field[kStateField][lane] == 0) return;  // it begins, with the weight that it was given
+// What of the overlap a contact that took over from a polygon doesn't feel: it goes as the bodies part, and
+// where commands have moved them.
+void ContactStages::stand_off(ContactBlock& block, int lane, Results& results) {
+  double& shift = block.field[kShift][lane];
+  if (shift == 0) return;
+  const int a = block.a[lane], b = block.b[lane];
+  const double overlap = results.touching[lane] != 0 ? -results.gap[lane] : 0;
+  if (!step_.setup) shift = std::clamp(shift, 0.0, overlap);
+  results.shift[lane] = std::min(shift, overlap);
   ContactState state;
   block.get(lane, kStateField, kContactStateSize, &state);
-  const ContactRest rest = rest_of(state, record(block.a[lane]), record(block.b[lane]));
+  if (step_.setup && state.active != 0 &&
+      !is_where_left(a, results.geometry(lane), same_place(a, b, results.offset_of(lane)), &state))
+    shift = results.shift[lane] = 0;
+  if (overlap > results.shift[lane]) return;
+  if (overlap > 0) note_depth(a, b, results.gap[lane]);
+  results.touching[lane] = 0;
+}
+
+// A contact that was left with more than its stiffness, or that does not feel all of its overlap, gets back
+// to its own as a polygon does.
+void ContactStages::relax_single(ContactBlock& block, int lane, Results& results) {
+  double &weight = block.field[kWeight][lane], &shift = block.field[kShift][lane];
+  if ((weight == 1 && shift == 0) || weight < 0) return;
+  if (block.field[kStateField][lane] == 0) return;  // it begins, with the weight that it was given
+  const int a = block.a[lane], b = block.b[lane];
+  ContactState state;
+  block.get(lane, kStateField, kContactStateSize, &state);
+  const ContactRest rest = rest_of(state, record(a), record(b));
   if (!rest.rests || (weight < 1 && step_.model != nullptr)) return;
-  const double change = kRelaxation * rest.phase * (1 - weight);
+  const double part = kRelaxation * rest.phase, change = part * (1 - weight);
+  const double before = results.geometry(lane).overlap;
+  shift *= 1 - part;
+  if (shift < kNoShift * record(b).radius) shift = 0;
+  results.shift[lane] = shift;
+  const double after = results.geometry(lane).overlap;
   weight += change;
   if (step_.model != nullptr) return;  // what its springs give up is missing at the next step's balance
   const ContactCoefficients& law = step_.laws[block.law[lane]];
-  book(-0.5 * change * (law.kn * gap * gap + law.kt * load(state.spring).squaredNorm()), block.a[lane],
-       block.b[lane]);
+  book(-0.5 * (law.kn * (weight * after * after - (weight - change) * before * before) +
+               change * law.kt * load(state.spring).squaredNorm()),
+       a, b);
 }
 
 }  // namespace nurbs

@@ -221,7 +221,7 @@ void ContactStages::give(int body, std::int32_t* head, WallContact* found, int c
     known[k] = number[k] != 0;
     if (known[k]) continue;
     const WallContact& f = found[k];
-    number[k] = add_listed({f.memory.model, f.memory.on_a, f.memory.on_b, {}, {0, 0, 0}, 1, 0});
+    number[k] = add_listed({f.memory.model, f.memory.on_a, f.memory.on_b, {}, {0, 0, 0}, 1, 0, 0});
     store(f.result.point_a, partner(number[k]).record.x);
     partner(number[k]).age = age;
     bind_listed(number[k], body);

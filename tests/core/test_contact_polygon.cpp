@@ -467,6 +467,37 @@ TEST(ContactPolygon, hand_over_keeps_the_energy_and_relaxing_books_it) {
   EXPECT_EQ(continuity_factor(0, polygon, state), 1);
 }
 
+// By the factor what is more than its own, by the plane's shift what is less; both ways and back.
+TEST(ContactPolygon, is_given_an_energy_by_its_factor_or_its_shift) {
+  Random random(8);
+  for (int trial = 0; trial < 300; ++trial) {
+    Particle p;
+    p.shape = (trial % 3 ? cuboid() : roller()).get();
+    const double overlap = random.log_uniform(1e-4, 1e-2);
+    p.q = random.turn_by(random.uniform(0, overlap));
+    p.x[2] = find_support(*p.shape, p.q.conjugate() * -Vec3::UnitZ()).h - overlap;
+    ContactPolygon polygon;
+    ASSERT_TRUE(make_plane_polygon(p, Vec3::Zero(), Vec3::UnitZ(), kKeptReach * overlap, &polygon));
+    const BodyFrame plane = plane_frame(Vec3::Zero()), body = body_frame(p);
+    const double own = stored_energy(polygon, evaluate(polygon, plane, body));
+    for (const double share : {1e-9, 0.3, 0.999, 1.0, 2.5, 0.01, 20.0, 0.5, 0.0, 0.7}) {
+      const PolygonState state = give_energy(share * own, 8, plane, body, &polygon);
+      EXPECT_NEAR(stored_energy(polygon, state), std::min(share, 8.0) * own, 1e-11 * own)
+          << trial << " " << share;
+      if (trial % 3) {
+        EXPECT_NEAR(state.least, -overlap + polygon.shift, 1e-12);
+      }
+      if (share > 1) {
+        EXPECT_EQ(polygon.shift, 0);
+      } else {
+        EXPECT_NEAR(polygon.factor, 1, 1e-12);
+        EXPECT_LE(polygon.shift, overlap * (1 + 1e-12));
+      }
+      EXPECT_NEAR(support_gap(polygon, nullptr, p), -overlap + polygon.shift, 1e-12);
+    }
+  }
+}
+
 // --- sliding
 
 TEST(PairPolygon, sliding_over_a_border_is_continuous) {

@@ -170,7 +170,7 @@ TEST(CoreSearch, against_all_features_of_the_cores) {
                 noise);
     EXPECT_LE((r.point_b - r.point_a - r.gap * r.normal).norm(), noise);
   }
-  EXPECT_GT(solved, 2500);
+  EXPECT_GT(solved, 2000);
   EXPECT_GT(apart, 1500);
 }
 
@@ -190,7 +190,9 @@ TEST(CoreSearch, cores_that_meet_are_left_to_the_other_rungs) {
       const ContactResult r = find_contact(a, b, ContactSettings(), memory);
       ASSERT_NE(r.status, Status::unresolved) << k << " " << sa.name << " " << sb.name;
       if (r.status == Status::separated) break;
-      if (step > 0) ASSERT_LE(std::abs(r.gap - last), kWay * (1 + 1e-5)) << k;
+      if (step > 0) {
+        ASSERT_LE(std::abs(r.gap - last), kWay * (1 + 1e-5)) << k;
+      }
       last = r.gap;
     }
   }

@@ -189,5 +189,58 @@ TEST(Memory, is_what_is_promised) {
   EXPECT_EQ(pool.blocks().size(), 125u);
 }
 
+// What restarts held before contacts had shifts is read as it was: a record without its last double, and a
+// polygon without its own.
+TEST(Memory, records_without_shifts_are_read) {
+  ContactPool pool;
+  pool.set_memory_size(2);
+  const std::int32_t number = pool.add(ContactRecord{});
+  ContactBlock& block = pool.block(number);
+  const int lane = ContactPool::lane(number);
+  for (int k = 0; k < kContactSize; ++k)
+    if (k != kFlat) block.field[k][lane] = k + 1;
+  block.field[kShift][lane] = 0.25;
+  pool.memory(block, lane)[1] = 7;
+  FlatContact& flat = pool.add_flat(number);
+  flat.polygon.count = 3;
+  flat.polygon.factor = 2;
+  flat.polygon.weight[1] = 0.5;
+  flat.polygon.shift = 0.125;
+  for (int k = 0; k < kBlock; ++k) flat.points.field[kStateField][k] = 10 + k;
+  pool.memory(flat.points, 3)[0] = 9;
+  double packed[kMostContactSize];
+  const int size = pool.pack(number, packed);
+  ASSERT_EQ(size, pool.packed_size(number));
+
+  const auto expect = [&](const std::int32_t n, double shift, double of_polygon) {
+    const ContactBlock& to = pool.block(n);
+    const int l = ContactPool::lane(n);
+    for (int k = 0; k < kContactSize; ++k)
+      if (k != kFlat && k != kShift) {
+        ASSERT_EQ(to.field[k][l], k + 1) << k;
+      }
+    EXPECT_EQ(to.field[kShift][l], shift);
+    EXPECT_EQ(pool.memory(to, l)[1], 7);
+    const FlatContact* polygon = pool.flat(n);
+    ASSERT_NE(polygon, nullptr);
+    EXPECT_EQ(polygon->polygon.count, 3);
+    EXPECT_EQ(polygon->polygon.shift, of_polygon);
+    EXPECT_EQ(polygon->points.field[kWeight][1], 1);
+    for (int k = 0; k < kBlock; ++k) EXPECT_EQ(polygon->points.field[kStateField][k], 10 + k);
+    EXPECT_EQ(pool.memory(polygon->points, 3)[0], 9);
+  };
+  int read = 0;
+  expect(pool.unpack(packed, &read), 0.25, 0.125);
+  EXPECT_EQ(read, size);
+
+  std::vector<double> old(packed, packed + size);
+  old[kFlat] -= kWithShifts;
+  const int polygon = kContactSize + 2 + static_cast<int>(sizeof(ContactPolygon) / sizeof(double)) - 1;
+  old.erase(old.begin() + polygon);
+  old.erase(old.begin() + kShift);
+  expect(pool.unpack(old.data(), &read), 0, 0);
+  EXPECT_EQ(read, size - 2);
+}
+
 }  // namespace
 }  // namespace nurbs::test_wide

@@ -271,6 +271,75 @@ class Landing(unittest.TestCase):
                 print(f"    boxes on a {floor}, dt {dt}: centre down to {lowest:.3f} of the least half edge", flush=True)
                 self.assertGreater(lowest, 0.95)
 
+ROUNDED = """
+units si
+newton off
+communicate single vel yes
+boundary f f f
+atom_style nurbs body.json
+{bodies}
+neighbor 0.03 bin
+neigh_modify delay 0
+fix E all property/global youngsModulus peratomtype {young}
+fix nu all property/global poissonsRatio peratomtype 0.3
+fix e all property/global coefficientRestitution peratomtypepair 1 0.4
+fix mu all property/global coefficientFriction peratomtypepair 1 0.5
+pair_style gran/nurbs model hertz tangential history
+pair_coeff * *
+timestep 1e-4
+{walls}
+compute contacts all nurbs/local gap
+compute deepest all reduce min c_contacts
+thermo_style custom step ke c_deepest
+thermo_modify format float %.15g
+thermo 10
+run {steps}
+"""
+HELD = "group held id 1\ngroup falls subtract all held\nfix weight falls gravity 100 vector 0 0 -1\nfix motion falls nve/nurbs"
+BED = """fix floor all wall/nurbs plane 0 0 0 0 0 1 type 1 model hertz tangential history
+fix west all wall/nurbs plane -0.7 0 0 1 0 0 type 1 model hertz tangential history
+fix east all wall/nurbs plane 0.7 0 0 -1 0 0 type 1 model hertz tangential history
+fix south all wall/nurbs plane 0 -0.7 0 0 1 0 type 1 model hertz tangential history
+fix north all wall/nurbs plane 0 0.7 0 0 -1 0 type 1 model hertz tangential history
+fix weight all gravity 9.81 vector 0 0 -1
+fix motion all nve/nurbs"""
+# Orientation of the one held; place, orientation and spin of the one that falls on it.
+HIT = ((-0.376925435119, 0.860126226718, 0.250555767756, 0.235227331993), (-0.01985264099, -0.000268745925, 0.16),
+       (0.67468691615, -0.188194742996, -0.158036065062, 0.695992030144), (-1.40907, -5.32279, -0.903434))
+
+
+class RoundedEdges(unittest.TestCase):
+    """Faces that lean until the rounded edge beside them bears. A contact that took over from a polygon was once as
+    much softer as its overlap was larger, to a thousandth and less, and stayed so: bodies sank into each other."""
+
+    def deepest(self, files, **words):
+        out = deck.run_ok(ROUNDED.format(**words), files={"body.json": deck.shape_file("rounded-box", 1, 1, 0.3, rounding=0.1), **files})
+        depth = out.thermo["deepest"]
+        return -depth[np.abs(depth) < 1e9].min(), out.thermo["KinEng"]
+
+    def test_a_body_that_bounces_on_another_stays_stiff(self):
+        first, x, second, spin = HIT
+        atoms = [(1, 1, 1, 0.07, DENSITY, 0.0, 0.0, 0.0, *first), (2, 1, 1, 0.1, DENSITY, *x, *second)]
+        bodies = deck.data_file(atoms, [(1, *[0] * 6), (2, 0, 0, -0.5, *spin)], ((-1, 1), (-1, 1), (-3, 1)))
+        depth, _ = self.deepest({"bodies.data": bodies}, bodies="read_data bodies.data", young="5e7", walls=HELD, steps=1500)
+        print(f"    deepest overlap {depth:.4f} m of bodies 0.06 and 0.04 m thick", flush=True)
+        self.assertLess(depth, 0.008)  # once 0.037
+
+    def test_a_bed_bears_itself(self):
+        bodies = """region box block -0.75 0.75 -0.75 0.75 -1 3 units box
+create_box 1 box
+lattice sc 0.3
+create_atoms 1 region box
+region above block -0.56 0.56 -0.56 0.56 0.1 2.9 units box
+group above region above
+group rest subtract all above
+delete_atoms group rest
+set group all density 2500 nurbs/scale 0.1 quat/random 49979687"""
+        depth, kinetic = self.deepest({}, bodies=bodies, young="1e8", walls=BED, steps=8000)
+        print(f"    deepest overlap in a bed {depth:.4f} m of bodies 0.06 m thick", flush=True)
+        self.assertLess(depth, 0.02)  # once 0.054
+        self.assertLess(kinetic[-1], 0.1 * kinetic.max())
+
 
 class Images(unittest.TestCase):
     def test_a_body_that_touches_its_own_images(self):

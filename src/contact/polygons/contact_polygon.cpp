@@ -67,7 +67,7 @@ PolygonState evaluate(const ContactPolygon& polygon, const BodyFrame& a, const B
   state.least = kInfinity;
   state.most = -kInfinity;
   const Vec3 outward_on_incident = incident.scale * (incident.axes.transpose() * outward);
-  const double base = outward.dot(apart) - level;
+  const double base = outward.dot(apart) - level + polygon.shift;
   double energy = 0;
   for (int i = 0; i < polygon.count; ++i) {
     Vec3 place;
@@ -116,7 +116,7 @@ double support_gap(const ContactPolygon& polygon, const Particle* a, const Parti
   const Vec3 apart = incident.x - (reference ? reference->x : origin);
   const double level = (reference ? reference->scale : 1) * polygon.offset;
   const double h = find_feature_top(*incident.shape, incident.q.conjugate() * -outward).h;
-  return outward.dot(apart) - incident.scale * h - level;
+  return outward.dot(apart) - incident.scale * h - level + polygon.shift;
 }
 
 static double outgrown_below(const PolygonState& state) {
@@ -174,6 +174,35 @@ double continuity_factor(double energy, const ContactPolygon& polygon, const Pol
   unit.factor = 1;
   const double full = stored_energy(unit, state);
   return energy > 0 && full > 0 ? energy / full : 1;
+}
+
+// Newton on the root of the energy over the shift, which is convex and falls: from its left side it stays
+// there.
+PolygonState give_energy(double energy, double stiffest, const BodyFrame& a, const BodyFrame& b,
+                         ContactPolygon* polygon) {
+  constexpr int kSteps = 20;
+  constexpr double kSameEnergy = 1e-13;
+  const double most = std::max(stiffest, polygon->factor), kept = polygon->shift;
+  polygon->shift = 0;
+  PolygonState state = evaluate(*polygon, a, b);
+  if (!(energy > 0)) {
+    polygon->shift = std::max(0.0, -state.least);
+    return evaluate(*polygon, a, b);
+  }
+  if (!(state.energy > 0)) return state;
+  polygon->factor = std::clamp(energy / state.energy, 1.0, most);
+  polygon->shift = energy < state.energy ? std::clamp(kept, 0.0, -state.least) : 0;
+  for (int k = 0; k < kSteps && energy < state.energy; ++k) {
+    const PolygonState now = evaluate(*polygon, a, b);
+    double force = 0;
+    for (int i = 0; i < now.count; ++i) force += polygon->weight[i] * std::max(0.0, -now.gap[i]);
+    const double more = now.energy - energy;
+    if (std::abs(more) <= kSameEnergy * energy) return now;
+    const double root = std::sqrt(now.energy);
+    polygon->shift = force > 0 ? std::max(0.0, polygon->shift + 2 * root * (root - std::sqrt(energy)) / force)
+                               : 0.5 * polygon->shift;
+  }
+  return evaluate(*polygon, a, b);
 }
 
 double relax(ContactPolygon& polygon, const PolygonState& state, double share) {

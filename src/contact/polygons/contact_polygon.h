@@ -84,8 +84,9 @@ struct ContactPolygon {
   double point[kContactPoints][3];   // incident shape axes, scale 1
   double weight[kContactPoints];     // sum 1
   std::uint32_t id[kContactPoints];  // vertices or sides that made it, for either reference; 0 unknown
+  double shift;  // by which the reference plane stands back, length: gaps are counted from there
 };
-static_assert(std::is_trivially_copyable_v<ContactPolygon> && sizeof(ContactPolygon) == 408);
+static_assert(std::is_trivially_copyable_v<ContactPolygon> && sizeof(ContactPolygon) == 416);
 
 // Mean of the points, incident shape axes, scale 1.
 Vec3 middle_of(const ContactPolygon& polygon);
@@ -178,6 +179,10 @@ double energy_after_rolling(const ContactPolygon& old, const ContactPolygon& pol
                             const PolygonState& state);
 // The factor that gives the polygon the energy U / kn; 1 where one of the two has none.
 double continuity_factor(double energy, const ContactPolygon& polygon, const PolygonState& state);
+// Gives it that energy by its factor where it holds less, up to `stiffest` (or what it had), and where it
+// holds more by its shift, after what its factor had over 1. Returns the state then.
+PolygonState give_energy(double energy, double stiffest, const BodyFrame& a, const BodyFrame& b,
+                         ContactPolygon* polygon);
 // Moves the factor to 1 by `share` in [0, 1] of its distance; returns the change of U / kn.
 double relax(ContactPolygon& polygon, const PolygonState& state, double share);
 

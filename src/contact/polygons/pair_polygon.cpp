@@ -13,6 +13,8 @@ constexpr double kOtherFaceCosine = 0.3;  // nor may one further than 72 degrees
 constexpr double kLineAngle = 0.8;        // rad, the same for the normal of a ruled line
 // A face's normal is the contact's to 8 degrees, or its overlap along that is hardly more than the least.
 constexpr double kSameWay = 0.99, kOtherWay = 1.1;
+// Of the deepest place over a face, that a new and an old polygon on it must have at least.
+constexpr double kNewDepth = 0.5, kKeptDepth = 0.25;
 constexpr double kPairShare = 0.5;   // as kWayShare, where the overlap's growth counts by itself
 constexpr double kMostAcross = 0.1;  // rad: one step of the search for the least overlap across lines
 constexpr int kAcrossSteps = 12;     // of them; 2 to 3 are usual
@@ -68,12 +70,16 @@ class FaceContact {
     return std::min(least, of_line);
   }
 
-  // `swallowed`: the reference face lies inside the incident one.
-  bool make(double overlap, double reach, ContactPolygon* out, bool* swallowed) {
+  // `depth`: overlap along the face's normal; `kept`: share of what lies deepest over the face that its
+  // points must have. `swallowed`: the reference face lies inside the incident one.
+  bool make(double overlap, double reach, double depth, double kept, ContactPolygon* out, bool* swallowed) {
     *swallowed = false;
     const double most = reach - overlap;
-    if (!face_points(most, swallowed) && !crease_points(overlap, most) && !line_points(overlap, most))
-      return false;
+    if (!face_points(most, swallowed) || !bears_deepest(kept, depth)) {
+      *swallowed = false;
+      ring_ = -1;
+      if (!crease_points(overlap, most) && !line_points(overlap, most)) return false;
+    }
     if (!finish(points_, reach, nullptr, out)) return false;
     out->reference = reference_.index;
     if (whole_ && ring_ >= 0) set_ring(*incident_.shape, incident_.index, ring_, out);
@@ -233,6 +239,15 @@ class FaceContact {
       points_.add(at, incident_.to_shape(plane_.lift(at, over)), over, id);
     }
     return points_.within(most);
+  }
+
+  // Whether the face's points are as deep as what else of the incident body lies over the reference face:
+  // where that leans, a rounded edge may be deeper.
+  bool bears_deepest(double kept, double depth) const {
+    const double deepest = *std::min_element(points_.gap, points_.gap + points_.plane.count);
+    if (deepest <= -kept * depth) return true;
+    const Support top = find_feature_top(*incident_.shape, down());
+    return inside_reference(plane_.project(incident_.place(top.point))) < 0;
   }
 
   // The part of a segment of the incident body over the reference face; false unless it is within reach.
@@ -488,7 +503,8 @@ bool make_pair_polygon(const Particle& pa, const Particle& pb, const Vec3& norma
   };
   const auto attempt = [&](int reference, ContactPolygon* polygon, bool* swallowed) {
     return nearest[reference] >= 0 && may_serve(reference) &&
-           contact(reference, nearest[reference]).make(overlap, reach, polygon, swallowed);
+           contact(reference, nearest[reference])
+               .make(overlap, reach, depth[reference], old ? kKeptDepth : kNewDepth, polygon, swallowed);
   };
   bool swallowed = false;
   if (attempt(first, out, &swallowed)) {
