@@ -34,7 +34,10 @@ void ContactStages::follow_surfaces(ContactBlock& block, int first, Results& res
     if (results.served[lane] != 0 || !goes_on(block, lane)) continue;
     const int a = block.a[lane], b = block.b[lane];
     const Particle pa = step_.bodies->particle(a), pb = step_.bodies->particle(b);
-    if (pa.shape->ellipsoid.found && pb.shape->ellipsoid.found) continue;  // have a closed form
+    // Have a closed form.
+    if ((pa.shape->ellipsoid.found && pb.shape->ellipsoid.found) ||
+        (pa.shape->core.found() && pb.shape->core.found()))
+      continue;
     block.get(lane, kPoints, 10, points[l]);
     pairs.on_a[l] = warm_point(points[l][0], *pa.shape);
     pairs.on_b[l] = warm_point(points[l][1], *pb.shape);
