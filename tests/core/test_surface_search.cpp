@@ -9,9 +9,12 @@
 #include <functional>
 #include <map>
 
+#include "body/support.h"
+#include "contact/walls/feature_search.h"
 #include "contact/walls/surface_search.h"
 #include "support/bodies.h"
 #include "support/random.h"
+#include "support/solid_families.h"
 
 namespace nurbs::test_surface_search {
 namespace {
@@ -525,6 +528,33 @@ TEST(SurfaceSearch, APlaneHoldsNothingBesideItsTriangles) {
   }
   EXPECT_GT(clear, 500);
   EXPECT_GT(touching, 300);
+}
+
+// A body that leans over a plate's border may have its deepest point over one triangle, and meet the plate in
+// another one only.
+TEST(SurfaceSearch, SharpBodiesAtTheBorderOfAPlateMeetAnyOfItsTriangles) {
+  Random random(13);
+  int met = 0, missed = 0, wrong = 0;
+  for (int round = 0; round < 20000; ++round) {
+    const test::Solid solid = families::any_solid(random);
+    const double size = random.log_uniform(0.5, 30);
+    const Mesh plate = sheet(
+        2, size, [](double, double) { return 0.0; }, random);
+    Particle p{solid.shape.get(), 1 / solid.shape->bounding_radius, Vec3::Zero(), random.turn()};
+    const Vec3 lowest = p.q * (p.scale * find_hull_support(*p.shape, p.q.conjugate() * -Vec3::UnitZ()).point);
+    const Vec3 at(size - random.log_uniform(1e-6, 0.05),
+                  random.below(2) ? random.uniform(-1, 1) * size : random.uniform(-0.01, 0.01),
+                  -random.log_uniform(1e-5, 1e-2));
+    p.x = at - lowest;
+    bool clear = true;  // of every triangle, by a plane that parts them
+    for (const Triangle& t : plate.triangles) clear = clear && is_clear_of(p, t.data(), 3);
+    const int count = search(p, plate).count;
+    wrong += (count > 0) == clear;
+    ++(clear ? missed : met);
+  }
+  EXPECT_LE(wrong, 1);  // once 6
+  EXPECT_GT(missed, 200);
+  EXPECT_GT(met, 10000);
 }
 
 TEST(SurfaceSearch, RidgeValleyAndVertex) {

@@ -359,16 +359,22 @@ bool SurfaceSearch::passes_by(int number, const Vec3& deepest, double gap) const
     return false;
   const MeshPatch::Plane& plane = patch_.planes()[number];
   std::vector<Vec3>& corners = workspace().corners;
-  bool over = false;
+  const Vec3 x = particle_.x + deepest;
+  if (cell_with(number, x) < 0) return false;
   for (int i = 0; i < plane.cells; ++i) {
     const int here = patch_.cell_in(plane.first + i);
-    const MeshPatch::Cell& cell = patch_.cells()[here];
-    if (!in_cell(cell, particle_.x + deepest)) continue;
-    over = true;
+    if (!((particle_.x - nearest(patch_.cells()[here], plane)).norm() < radius_)) continue;
     corners.clear();
     add_corners(here, &corners);
     if (!misses(corners)) return false;
-    // A sharp body may be in the wall by a neighbour, and meet the face nowhere.
+  }
+  // A sharp body may be in the wall by a neighbour of the cell that it is over, and meet the face nowhere.
+  for (int i = 0; i < plane.cells; ++i) {
+    const int here = patch_.cell_in(plane.first + i);
+    const MeshPatch::Cell& cell = patch_.cells()[here];
+    if (!in_cell(cell, x)) continue;
+    corners.clear();
+    add_corners(here, &corners);
     for (int k = cell.first; k < cell.first + cell.corners; ++k) {
       const MeshPatch::Edge& e = patch_.edges()[patch_.edge_of(k)];
       if (e.inner || e.sides != 2) continue;
@@ -377,7 +383,7 @@ bool SurfaceSearch::passes_by(int number, const Vec3& deepest, double gap) const
     }
     if (!misses(corners)) return false;
   }
-  return over;
+  return true;
 }
 
 void SurfaceSearch::add_corners(int cell, std::vector<Vec3>* corners) const {
