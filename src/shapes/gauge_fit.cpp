@@ -31,12 +31,13 @@ constexpr double kInside = 0.97;       // of the way to a bound
 constexpr double kShortest = 1e-4;     // steps: nothing more is to be had
 constexpr double kReserve = 0.25;      // share of the least curvature that is wanted between places
 constexpr double kNewSlack = 0.1;      // of a place added, over its form's trace
+constexpr double kFirstInside = 0.1;   // least slack of a place's inward bound at first, of the distance
 constexpr double kRegularised = 1e-9;  // of the conditions' block of the matrix
 
-// A bound's slack and multiplier, the residual of the slack, changes of both in a step, and the product of
-// those that the first, affine step would make.
+// A bound's slack and multiplier, the residual of the slack, changes of both in a step, the product of those
+// that the first, affine step would make, and the bound's weight where the centre is looked for.
 struct Slack {
-  double s = 1, z = 1, residual = 0, ds = 0, dz = 0, affine = 0;
+  double s = 1, z = 1, residual = 0, ds = 0, dz = 0, affine = 0, weight = 1;
 };
 
 // The same of a symmetric matrix that is to be positive definite.
@@ -78,9 +79,10 @@ struct Ray {
 struct Place : Ray {  // of the grid, where the body may be outside and must be convex
   int shares;
   double wanted;       // distance along the facet over the relative difference of gauges, in distances wanted
+  double inward = 1;   // the same of distances inward, along the body's normal
   Mat2 first;          // form of the present body, held in a step
   bool apart = false;  // between the others: only for its curvature
-  Slack distance;
+  Slack distance, inside;
   FormSlack form;
 };
 
@@ -227,6 +229,10 @@ class InteriorPoint {
     return second_form(j) - options_.least_curvature * s.first;
   }
 
+  double wanted_inward(const Ray& ray, double g, double ga, double gb) const {
+    return 1 / ((options_.metric * ray.gradient(g, ga, gb)).norm() * options_.inward);
+  }
+
   // First forms and normals of the present body: held in a step.
   void refer() {
     for (Piece& piece : pieces_) {
@@ -234,10 +240,11 @@ class InteriorPoint {
       for (Place& s : piece.places) {
         const Jet j = jet(net, s);
         s.first = s.first_form(j[0], j[1], j[2]);
+        s.inward = wanted_inward(s, j[0], j[1], j[2]);
       }
       for (Vertex& s : piece.vertices) {
         const Eigen::Matrix<double, 1, 3> j = net.transpose() * s.shares;
-        s.wanted = 1 / ((options_.metric * s.gradient(j[0], j[1], j[2])).norm() * options_.inward);
+        s.wanted = wanted_inward(s, j[0], j[1], j[2]);
       }
     }
   }
@@ -276,8 +283,18 @@ class InteriorPoint {
     const double least = 1 / (1 + t / s.wanted), by = least * least / s.wanted;
     return {g / s.target - least, by, -2 * by * least / s.wanted, 1 / s.target};
   }
-  static Left left(const Vertex& s, double g, double t) {
-    return {t / s.wanted - (g / s.target - 1), 1 / s.wanted, 0, -1 / s.target};
+  static Left left_inside(const Ray& s, double wanted, double g, double t) {
+    return {t / wanted - (g / s.target - 1), 1 / wanted, 0, -1 / s.target};
+  }
+  static Left left(const Vertex& s, double g, double t) { return left_inside(s, s.wanted, g, t); }
+  static Left left_inside(const Place& s, double g, double t) { return left_inside(s, s.inward, g, t); }
+
+  // The distances that are bounded at a place, where the gauge is g.
+  template <typename AnyPlace, typename Do>
+  void for_bounds(AnyPlace& s, double g, const Do& act) const {
+    if (s.apart) return;
+    act(s.distance, left(s, g, allowed_));
+    if (centring_) act(s.inside, left_inside(s, g, allowed_));
   }
 
   // Slacks as the ball leaves them, multipliers of one product with which the pull on t is in balance.
@@ -311,8 +328,11 @@ class InteriorPoint {
   template <typename Do>
   void for_slacks(const Do& act) {
     for (Piece& piece : pieces_) {
-      for (Place& s : piece.places)
-        if (!s.apart) act(s.distance);
+      for (Place& s : piece.places) {
+        if (s.apart) continue;
+        act(s.distance);
+        if (centring_) act(s.inside);
+      }
       for (Vertex& s : piece.vertices) act(s.distance);
     }
   }
@@ -375,13 +395,14 @@ class InteriorPoint {
       const Local net = local(gauge_, piece);
       Local load = Local::Zero();
       const auto push = [&](const Slack& c, const Left& l, const auto& share) {
-        const double q = (product - (corrected ? c.affine : 0)) / c.s - c.z / c.s * c.residual;
+        const double q = (c.weight * product - (corrected ? c.affine : 0)) / c.s - c.z / c.s * c.residual;
         load += q * l.share * share;
         out.allowed += q * l.by_allowed;
       };
       for (const Place& s : piece.places) {
         const auto& share = shares_[s.shares];
-        if (!s.apart) push(s.distance, left(s, net.dot(share.col(0)), allowed_), share.col(0));
+        for_bounds(s, net.dot(share.col(0)),
+                   [&](const Slack& c, const Left& l) { push(c, l, share.col(0)); });
         const FormSlack& c = s.form;
         const Mat2 inverse = c.s.inverse();
         Mat2 q = kForms * product * inverse - symmetric(inverse * c.residual * c.z);
@@ -416,7 +437,7 @@ class InteriorPoint {
       for (Place& s : piece.places) {
         const auto& share = shares_[s.shares];
         const Jet j = net.transpose() * share;
-        if (!s.apart) bound(s.distance, left(s, j[0], allowed_), share.col(0));
+        for_bounds(s, j[0], [&](Slack& c, const Left& l) { bound(c, l, share.col(0)); });
         s.form.residual = form(j, s) - s.form.s;
         add_form(s.form, share);
       }
@@ -470,12 +491,12 @@ class InteriorPoint {
       const Local net = local(gauge_, piece), change = local(step_, piece);
       const auto follow = [&](Slack& c, const Left& l, double by) {
         c.ds = l.share * by + l.by_allowed * more_ + c.residual;
-        c.dz = (product - (corrected ? c.affine : 0)) / c.s - c.z - c.z / c.s * c.ds;
+        c.dz = (c.weight * product - (corrected ? c.affine : 0)) / c.s - c.z - c.z / c.s * c.ds;
       };
       for (Place& s : piece.places) {
         const auto& share = shares_[s.shares];
         const Jet by = change.transpose() * share;
-        if (!s.apart) follow(s.distance, left(s, net.dot(share.col(0)), allowed_), by[0]);
+        for_bounds(s, net.dot(share.col(0)), [&](Slack& c, const Left& l) { follow(c, l, by[0]); });
         FormSlack& c = s.form;
         const Mat2 inverse = c.s.inverse();
         c.ds = second_form(by) + c.residual;
@@ -534,6 +555,23 @@ class InteriorPoint {
     return true;
   }
 
+  // Bounds both ways at the places, those outward of the weight of the others, the vertices' among them: the
+  // side with more of them would press the body to the other.
+  void balance() {
+    centring_ = true;
+    for (Piece& piece : pieces_) {
+      const Local net = local(gauge_, piece);
+      const double vertices = static_cast<double>(piece.vertices.size()),
+                   places = static_cast<double>(piece.places.size());
+      for (Place& s : piece.places) {
+        s.distance.weight = 1 + vertices / places;
+        const double value = left_inside(s, net.dot(shares_[s.shares].col(0)), allowed_).value;
+        s.inside.s = std::max(value, kFirstInside * allowed_ / s.inward);
+        s.inside.z = 1 / s.inside.s;
+      }
+    }
+  }
+
   // The centre of what distances of those wanted leave, where curvature is far from its bounds. Where the
   // body is dented between places, more are added.
   void centre() {
@@ -541,6 +579,7 @@ class InteriorPoint {
     for_slacks([&](Slack& c) { c.z /= product; });
     for_forms([&](FormSlack& c) { c.z /= product; });
     allowed_ = std::max(1.0, kRoom * worst());
+    balance();
     for (int round = 0; round <= kDenser; ++round) {
       const Vector before = gauge_;
       for (int k = 0; k < kCentreSteps; ++k) {
@@ -654,6 +693,7 @@ class InteriorPoint {
   Vector gauge_, step_;
   double allowed_ = 0, more_ = 0;  // t: largest distance over that wanted; its step
   double terms_ = 0;               // of the products' mean
+  bool centring_ = false;          // places are bounded inward, too
 };
 
 }  // namespace

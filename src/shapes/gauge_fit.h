@@ -27,10 +27,10 @@ struct GaugeFit {
 // vertices. From a ball on, a primal-dual interior-point method (Mehrotra's predictor and corrector; forms of
 // curvature by the direction of Helmberg, Rendl, Vanderbei and Wolkowicz) presses the largest distance,
 // relative to that wanted, down to 1 or as far as it goes; from 1 on it goes to the centre of what the wanted
-// distances leave, where curvature is far from its bounds, and looks between the samples for dents. `hull`
-// contains the origin and is about 1 in size; degree 3 or 4. Deterministic; 0.1 s for 600 control points, 0.3
-// s for 1200, 2 s for 2900. They are two to three times as many as polynomial patches need (fit_convex),
-// whose points crowd where edges are sharp, but it always converges.
+// distances leave either way, where curvature is far from its bounds, and looks between the samples for
+// dents. `hull` contains the origin and is about 1 in size; degree 3 or 4. Deterministic; 0.1 s for 600
+// control points, 0.3 s for 1200, 2 s for 2900. They are two to three times as many as polynomial patches
+// need (fit_convex), whose points crowd where edges are sharp, but it always converges.
 GaugeFit fit_gauge(int degree, int spans, const ConvexHull& hull, const GaugeFitOptions& options);
 
 }  // namespace nurbs
