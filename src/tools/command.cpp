@@ -3,12 +3,15 @@
 
 #include <unistd.h>
 
+#include <algorithm>
+#include <cctype>
 #include <cerrno>
 #include <charconv>
 #include <cstdio>
 #include <cstring>
 #include <filesystem>
 #include <fstream>
+#include <iterator>
 #include <utility>
 
 namespace nurbs {
@@ -46,6 +49,24 @@ void write_whole(const std::string& file, const std::string& text) {
     std::remove(draft.c_str());
     throw std::runtime_error("can't write " + file + ": " + reason);
   }
+}
+
+std::string ending(const std::string& file) {
+  std::string out = std::filesystem::path(file).extension().string();
+  for (char& c : out) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+  return out;
+}
+
+void check_output(const std::string& command, const std::string& input, const std::string& output) {
+  constexpr const char* kOthers[] = {".stl",  ".obj", ".ply",  ".step", ".stp",
+                                     ".iges", ".igs", ".brep", ".vtu",  ".png"};
+  std::error_code error;
+  if (std::filesystem::equivalent(input, output, error))
+    throw UsageError(command + ": -o " + output + " is the input file, which it would replace");
+  const std::string kind = ending(output);
+  if (std::find(std::begin(kOthers), std::end(kOthers), kind) != std::end(kOthers))
+    throw UsageError(command + ": -o " + output + " ends in " + kind +
+                     ", but shape files are JSON: name it .json");
 }
 
 void print_warnings(const std::vector<std::string>& warnings) {

@@ -44,6 +44,13 @@ std::string format(const char* pattern, double value);
 // device.
 void write_whole(const std::string& file, const std::string& text);
 
+// The ending of a file's name with its dot, in small letters.
+std::string ending(const std::string& file);
+
+// Throws UsageError that names `command` where a shape file can't go to `output`: it is the input file (if
+// any), or is named as a mesh, a CAD file or a picture.
+void check_output(const std::string& command, const std::string& input, const std::string& output);
+
 // The millimetres of "mm", "cm", "m", "um", "in" or a number; throws UsageError that names `command`.
 double parse_unit(const std::string& command, const std::string& text);
 

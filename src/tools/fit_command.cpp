@@ -239,6 +239,7 @@ size_t control_points(const std::vector<NurbsSurface>& surfaces) {
 }
 
 void simplify(const FitArguments& a) {
+  check_output("simplify", a.file, a.output);
   const double tolerance = parse_share("simplify: --tolerance", a.tolerance, kCoarsest);
   std::vector<std::string> warnings;
   const auto read = read_shape_file(a.file, &warnings);
@@ -317,6 +318,7 @@ Command add_fit(CLI::App& app) {
   command->add_option("--piece", a->piece, "of a mesh of several pieces: largest, or its number")
       ->type_name("P");
   return {command, [a] {
+            check_output("fit", a->file, a->output);
             fit_tolerance("fit", a->tolerance);
             fit_mesh(*a, read_mesh_file(a->file));
           }};

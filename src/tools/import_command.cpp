@@ -129,6 +129,7 @@ std::vector<CadSolid> read_in_time(const std::string& file, double scale) {
 }
 
 void import(const Arguments& a) {
+  check_output("import", a.file, a.output);
   const double tolerance = fit_tolerance("import", a.tolerance);
   const double unit = parse_unit("import", a.unit);
   continue_in_child(a.file);

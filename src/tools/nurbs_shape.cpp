@@ -367,6 +367,7 @@ Body make_rounded_polyhedron(const Options& options) {
   }
   if (options.has("--radius")) options.fail("--radius is for --solid: a mesh has its own size");
   const std::string file = options.text("--mesh");
+  check_output("make rounded-polyhedron", file, options.output());
   try {
     std::vector<Vec3> points = read_mesh_file(file).points;
     const Vec3 place = move_to_origin(points);
@@ -589,6 +590,7 @@ void make_pebbles(const Options& options) {
 void make(const Maker& maker, const Options& options) {
   options.check();
   const std::string file = options.output();
+  check_output("make " + std::string(maker.kind), "", file);
   Body body = maker.make(options);
   std::vector<std::string> warnings;
   const auto shape = make_shape(file, body.surfaces, std::nullopt, &warnings);

@@ -40,10 +40,6 @@ std::shared_ptr<const Shape> load(const std::string& file) {
   return shape;
 }
 
-std::string ending(const std::string& file) {
-  return std::filesystem::path(file).extension().string();
-}
-
 std::string vtu(const Shape& shape) {
   VtuBody body;
   body.id = body.type = 1;

@@ -470,6 +470,31 @@ class Fit(unittest.TestCase):
                                (["--keep", "mass"], "--keep is mass")):
             self.assert_one_error(call("fit", mesh, *options, "-o", self.out), error)
 
+    def test_output_is_no_input_nor_another_kind_of_file(self):
+        """`fit a.stl -o a.stl` once replaced the scan by JSON."""
+        points, faces = meshes.icosphere(2)
+        mesh = self.mesh(meshes.binary_stl(points, faces))
+        shape = self.place / "shape.json"
+        call("make", "pebble", shape).check_returncode()
+        (self.place / "link.json").symlink_to(mesh)
+        (self.place / "same.json").hardlink_to(shape)
+        solid = self.place / "solid.step"
+        call("export", shape, "-o", solid).check_returncode()
+        before = {p.name: p.read_bytes() for p in self.place.iterdir()}
+        for command, file, out, error in (
+                ("fit", mesh, mesh, "is the input file"), ("fit", mesh, self.place / "link.json", "is the input file"),
+                ("fit", mesh, self.place / "new.STL", "ends in .stl, but shape files are JSON"),
+                ("fit", mesh, self.place / "new.png", "ends in .png"), ("simplify", shape, shape, "is the input file"),
+                ("simplify", shape, self.place / "same.json", "is the input file"),
+                ("simplify", shape, self.place / "new.vtu", "ends in .vtu"),
+                ("import", solid, solid, "is the input file"), ("import", solid, self.place / "new.stp", "ends in .stp"),
+                ("make", "pebble", self.place / "new.obj", "make pebble: -o ")):
+            with self.subTest(command=command, out=out.name):
+                self.assert_one_error(call(command, file, "-o", out), error)
+                self.assertEqual({p.name: p.read_bytes() for p in self.place.iterdir()}, before)
+        self.assert_one_error(call("make", "rounded-polyhedron", "--mesh", mesh, "--rounding", "0.1",
+                                   self.place / "link.json"), "is the input file")
+
     def test_simplify(self):
         made = call("make", "superellipsoid", "--axes", "1,1,1.5", "--exponent", "2.5", "--spans", "4", self.place / "fine.json")
         self.assertEqual(made.returncode, 0, made.stderr)
