@@ -1,10 +1,12 @@
 // Each array is streamed straight into base64: its size in bytes first (VTK's header), then its values.
 #include "io/vtu_file.h"
 
+#include <algorithm>
 #include <cstdint>
 #include <cstdlib>
 #include <cstring>
 #include <istream>
+#include <iterator>
 #include <ostream>
 
 #include "io/vtk_bezier.h"
@@ -188,6 +190,32 @@ const char* byte_order() {
   return first == 1 ? "LittleEndian" : "BigEndian";
 }
 
+constexpr std::pair<char, const char*> kEscapes[] = {
+    {'&', "&amp;"}, {'<', "&lt;"}, {'>', "&gt;"}, {'"', "&quot;"}};
+
+std::string escaped(const std::string& text) {
+  std::string out;
+  for (const char c : text) {
+    const auto* escape =
+        std::find_if(std::begin(kEscapes), std::end(kEscapes), [c](const auto& e) { return e.first == c; });
+    out += escape == std::end(kEscapes) ? std::string(1, c) : escape->second;
+  }
+  return out;
+}
+
+std::string unescaped(const std::string& text) {
+  std::string out;
+  for (std::size_t at = 0; at < text.size();) {
+    const auto* escape = std::find_if(std::begin(kEscapes), std::end(kEscapes), [&](const auto& e) {
+      return text.compare(at, std::strlen(e.second), e.second) == 0;
+    });
+    const bool is_one = escape != std::end(kEscapes);
+    out += is_one ? escape->first : text[at];
+    at += is_one ? std::strlen(escape->second) : 1;
+  }
+  return out;
+}
+
 }  // namespace
 
 void write_vtu(std::ostream& out, const std::vector<VtuBody>& bodies, const std::vector<const Shape*>& shapes,
@@ -209,7 +237,7 @@ void write_pvd(std::ostream& out, const std::vector<std::pair<double, std::strin
       << "\">\n<Collection>\n";
   out.precision(17);
   for (const auto& [time, file] : entries) {
-    out << "<DataSet timestep=\"" << time << "\" part=\"0\" file=\"" << file << "\"/>\n";
+    out << "<DataSet timestep=\"" << time << "\" part=\"0\" file=\"" << escaped(file) << "\"/>\n";
   }
   out << "</Collection>\n</VTKFile>\n";
 }
@@ -223,7 +251,7 @@ std::vector<std::pair<double, std::string>> read_pvd(std::istream& in) {
     const std::size_t begin = file + std::strlen(before_file), end = line.find('"', begin);
     if (end == std::string::npos) continue;
     entries.emplace_back(std::strtod(line.c_str() + std::strlen(before_time), nullptr),
-                         line.substr(begin, end - begin));
+                         unescaped(line.substr(begin, end - begin)));
   }
   return entries;
 }

@@ -98,28 +98,43 @@ void DumpNurbsVtk::write_data(int n, double* particles) {
   for (int i = 0; i < n; ++i) bodies_.push_back(unpack_particle(particles + i * kParticleSize));
 }
 
-// A run that starts at a later step (after read_restart) keeps the snapshots of steps before it. The host
-// counts time from zero again there: the film's goes on.
-void DumpNurbsVtk::continue_film() {
-  std::ifstream in(collection_name(file_before_star_));
+// Of a snapshot's file without its folder; -1: it is none of this dump's.
+bigint DumpNurbsVtk::step_of(const std::string& file) const {
   const std::string before = without_folder(file_before_star_);
-  bigint last = 0;
+  if (file.compare(0, before.size(), before) != 0) return -1;
+  const std::string rest = file.substr(before.size());
+  char* end = nullptr;
+  const long long step = std::strtoll(rest.c_str(), &end, 10);
+  return end == rest.c_str() || file_after_star_ != end ? -1 : step;
+}
+
+// A run that starts at a later step (after read_restart) keeps the snapshots of steps before it.
+void DumpNurbsVtk::read_film() {
+  std::ifstream in(collection_name(file_before_star_));
   for (const auto& [time, file] : nurbs::read_pvd(in)) {
-    if (file.compare(0, before.size(), before) != 0) continue;
-    const std::string rest = file.substr(before.size());
-    char* end = nullptr;
-    const long long step = std::strtoll(rest.c_str(), &end, 10);
-    if (end == rest.c_str() || file_after_star_ != end || step >= update->firststep) continue;
-    snapshots_.emplace_back(time, file);
-    last = step;
+    const bigint step = step_of(file);
+    if (step >= 0 && step < update->firststep) snapshots_.emplace_back(time, file);
   }
-  if (!snapshots_.empty() && update->get_cur_time() <= snapshots_.back().first)
-    earlier_time_ = snapshots_.back().first + static_cast<double>(update->ntimestep - last) * update->dt -
-                    update->get_cur_time();
+}
+
+// Snapshots from this step on are of a run that reset_timestep took back. The host may count time from zero
+// again, there and after read_restart: the film's goes on.
+void DumpNurbsVtk::continue_film() {
+  if (snapshots_.empty() && update->firststep > 0) read_film();
+  const auto later = [this](const auto& snapshot) { return step_of(snapshot.second) >= update->ntimestep; };
+  snapshots_.erase(std::remove_if(snapshots_.begin(), snapshots_.end(), later), snapshots_.end());
+  if (snapshots_.empty()) {
+    earlier_time_ = 0;
+    return;
+  }
+  const auto& [time, file] = snapshots_.back();
+  if (earlier_time_ + update->get_cur_time() <= time)
+    earlier_time_ =
+        time + static_cast<double>(update->ntimestep - step_of(file)) * update->dt - update->get_cur_time();
 }
 
 void DumpNurbsVtk::save_snapshot() {
-  if (snapshots_.empty() && update->firststep > 0) continue_film();
+  continue_film();
   std::sort(bodies_.begin(), bodies_.end(), [](const VtuBody& a, const VtuBody& b) { return a.id < b.id; });
   const ShapeLibrary& library = static_cast<const AtomVecNurbs*>(atom->avec)->shapes();
   std::vector<const nurbs::Shape*> shapes;
@@ -131,8 +146,7 @@ void DumpNurbsVtk::save_snapshot() {
   const double time = earlier_time_ + update->get_cur_time();
   save(file, [&](std::ostream& out) { nurbs::write_vtu(out, bodies_, shapes, time); });
 
-  const std::pair<double, std::string> snapshot(time, without_folder(file));
-  if (snapshots_.empty() || snapshots_.back() != snapshot) snapshots_.push_back(snapshot);
+  snapshots_.emplace_back(time, without_folder(file));
   save(collection_name(file_before_star_), [&](std::ostream& out) { nurbs::write_pvd(out, snapshots_); });
 }
 

@@ -37,7 +37,9 @@ class DumpNurbsVtk : public Dump {
   void write_data(int n, double* particles) override;
 
  private:
+  void read_film();
   void continue_film();
+  bigint step_of(const std::string& file) const;
   void save_snapshot();
   void save(const std::string& file, const std::function<void(std::ostream&)>& content);
 

@@ -6,6 +6,7 @@ import pathlib
 import re
 import sys
 import unittest
+import xml.etree.ElementTree
 
 import numpy as np
 import vtk
@@ -177,6 +178,24 @@ class DumpVtk(unittest.TestCase):
         self.assertEqual(self.listed(again), [(f"scene-{k}.vtu", k * 1e-3) for k in (0, 10, 20, 30)])
         anew = deck.run_ok(DECK.format(file="scene-*.vtu"), files={**self.files, "scene.pvd": kept["scene.pvd"]})
         self.assertEqual([name for name, _ in self.listed(anew)], [f"scene-{k}.vtu" for k in (0, 10, 20)])
+
+    def test_collection_after_reset_timestep(self):
+        """Snapshots that are written again, and those later than the present step, give way to the new ones."""
+        text = DECK.format(file="scene-*.vtu")
+        again = deck.run_ok(text + "reset_timestep 0\nrun 10\n", files=self.files)
+        self.assertEqual(self.listed(again), [("scene-0.vtu", 0), ("scene-10.vtu", 0.01)])
+        back = deck.run_ok(text + "reset_timestep 10\nrun 20\n", files=self.files)
+        self.assertEqual(self.listed(back), [(f"scene-{k}.vtu", k * 1e-3) for k in (0, 10, 20, 30)])
+
+    def test_collection_is_xml_whatever_the_file_is_called(self):
+        name = 'a&b<c>"d\'-*.vtu'
+        run = deck.run_ok(DECK.format(file=name) + "write_restart half.rst\n", files=self.files)
+        start = "units si\nnewton off\ncommunicate single vel yes\natom_modify sort 0 0\nread_restart half.rst\n"
+        kept = {file: run.path / file for file in ("half.rst", 'a&b<c>"d\'.pvd')}
+        again = deck.run_ok(start + DECK[DECK.index("neighbor"):].format(file=name), files=kept)
+        for result, steps in ((run, (0, 10, 20)), (again, (0, 10, 20, 30, 40))):
+            listed = xml.etree.ElementTree.parse(result.path / 'a&b<c>"d\'.pvd').iter("DataSet")
+            self.assertEqual([entry.get("file") for entry in listed], [name.replace("*", str(step)) for step in steps])
 
     def listed(self, run):
         entries = re.findall(r'timestep="(.*?)".*file="(.*?)"', run.read("scene.pvd"))
