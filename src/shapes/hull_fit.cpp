@@ -377,8 +377,14 @@ class ErrorFall {
 
 class HullFitter {
  public:
-  HullFitter(const ConvexHull& hull, const HullFitOptions& options, double thin, double volume_error)
-      : hull_(hull), options_(options), volume_error_(volume_error), mass_(hull.properties()) {
+  // `spline_points`: the most of splines, where that is less than the most of any body; 0: any number.
+  HullFitter(const ConvexHull& hull, const HullFitOptions& options, double thin, double volume_error,
+             size_t spline_points = 0)
+      : hull_(hull),
+        options_(options),
+        spline_points_(spline_points > 0 ? spline_points : options.most_points),
+        volume_error_(volume_error),
+        mass_(hull.properties()) {
     radius_ = bounding_radius(hull, mass_.center);
     tolerance_ = options.tolerance * radius_;
     frame_ = even_frame(mass_, tolerance_, thin);
@@ -414,14 +420,12 @@ class HullFitter {
       if (try_gauge(degree, spans, even_hull)) return best_;
       if (best_.shape && further++ == kFurther) break;
     }
-    if (any && !best_.shape && options_.most_points == 0 && try_faces(kMostFaces * kPointsPerFace))
-      return best_;
+    if (any && !best_.shape && spline_points_ == 0 && try_faces(kMostFaces * kPointsPerFace)) return best_;
     if (best_.shape) return best_;  // its convexity is measured, not proven
-    if (any && options_.most_points == 0 && (try_few_faces() || try_polyhedron(kMostFacesAtLast)))
-      return best_;
+    if (any && spline_points_ == 0 && (try_few_faces() || try_polyhedron(kMostFacesAtLast))) return best_;
     if (best_.shape) return best_;
-    if (options_.most_points > 0)
-      throw ShapeError("no body of at most " + std::to_string(options_.most_points) +
+    if (spline_points_ > 0)
+      throw ShapeError("no body of at most " + std::to_string(spline_points_) +
                        " control points is within the tolerance of " + percent(options_.tolerance) +
                        " of the hull");
     throw ShapeError("no body of up to " + std::to_string(most_points_) +
@@ -444,6 +448,7 @@ class HullFitter {
     for (double radius : {volume_radius, 0.5 * (radius_ + inner)}) {
       std::vector<NurbsSurface> body = exact_ellipsoid(Vec3::Constant(radius));
       transform(body, Mat3::Identity(), mass_.center);
+      if (too_many(body)) return false;
       if (judge(std::move(body), "sphere")) return true;
     }
     return false;
@@ -455,7 +460,10 @@ class HullFitter {
   }
 
   bool too_many(int degree, int spans) const {
-    return options_.most_points > 0 && points_of(degree, spans) > options_.most_points;
+    return spline_points_ > 0 && points_of(degree, spans) > spline_points_;
+  }
+  bool too_many(const std::vector<NurbsSurface>& body) const {
+    return options_.most_points > 0 && control_points(body) > options_.most_points;
   }
 
   // Faces of a hull that is a polyhedron of up to kMostFaces, 0 where it is not.
@@ -521,6 +529,7 @@ class HullFitter {
       if (few.size() > kMostCorners) continue;
       const double cut = few.size() < polygon.size() ? kRimCut * left : left;
       std::vector<NurbsSurface> body = revolve(rounded_profile(few, cut));
+      if (too_many(body)) continue;
       transform(body, turn, mass_.center);
       const std::string kind =
           "body of revolution, its rims rounded, " + std::to_string(body.size()) + " surfaces";
@@ -561,6 +570,7 @@ class HullFitter {
         const double rounding = 0.5 * (low + high);
         try {
           const auto body = make_shape("fit", rounded_polyhedron(faces, mass_.center, rounding));
+          if (too_many(body->surfaces)) break;
           const HullDistance d = hull_distance(*body, hull_, 0.01 * tolerance_);
           if (d.worst() < least) {
             least = d.worst();
@@ -609,6 +619,7 @@ class HullFitter {
     for (int k = 0, halved = 0; k < most && halved <= kHalvings;) {
       try {
         const auto body = rounded(rounding);
+        if (too_many(body->surfaces)) return false;
         const bool to_judge = ++k >= kRoundings;
         if (to_judge && judge(body->surfaces, kind, true)) return true;
         const HullDistance d = to_judge ? judged_ : hull_distance(*body, hull_, 0.01 * tolerance_);
@@ -834,6 +845,7 @@ class HullFitter {
 
   const ConvexHull& hull_;
   const HullFitOptions& options_;
+  size_t spline_points_;
   double volume_error_;  // of bodies that are taken, at the most
   MassProperties mass_;
   Frame frame_;
@@ -858,6 +870,12 @@ class HullFitter {
 
 }  // namespace
 
+size_t control_points(const std::vector<NurbsSurface>& surfaces) {
+  size_t count = 0;
+  for (const NurbsSurface& s : surfaces) count += s.points.size();
+  return count;
+}
+
 HullDistance hull_distance(const Shape& shape, const ConvexHull& hull, double resolution) {
   HullDistance out;
   out.outward = outward_distance(shape, hull, resolution);
@@ -875,10 +893,10 @@ HullFit fit_near_one(const ConvexHull& hull, const HullFitOptions& options) {
   const bool thin = principal_lengths(own)[0] < kThin * options.tolerance * fit.radius;
   if (!thin || error(fit) < kVolumeError) return fit;
   if (options.progress) options.progress("its volume is off by " + percent(error(fit)) + ":");
-  HullFitOptions few = options;
-  few.most_points = options.most_points > 0 ? std::min(options.most_points, kStrictPoints) : kStrictPoints;
+  const size_t points =
+      options.most_points > 0 ? std::min(options.most_points, kStrictPoints) : kStrictPoints;
   try {
-    HullFit strict = HullFitter(hull, few, kStrictThin, kVolumeError).run();
+    HullFit strict = HullFitter(hull, options, kStrictThin, kVolumeError, points).run();
     if (error(strict) < error(fit)) return strict;
   } catch (const ShapeError&) {  // a body that is so thin wants more points than that
   }

@@ -23,6 +23,11 @@ struct HullDistance {
 };
 HullDistance hull_distance(const Shape& shape, const ConvexHull& hull, double resolution);
 
+size_t control_points(const std::vector<NurbsSurface>& surfaces);  // all together
+
+// Of the least body that fits hulls of any form, all surfaces together: six bicubic patches.
+constexpr size_t kLeastPoints = 96;
+
 struct HullFitOptions {
   double tolerance = 0.01;                           // of the hull's bounding radius about its centre of mass
   int spans = 0;                                     // per patch and direction, 0: as few as do

@@ -181,7 +181,8 @@ void fit_mesh(const FitArguments& a, const TriangleMesh& raw) {
                 hull->mesh().points.size(), 100 * (hull->properties().volume / own.volume - 1), own.volume);
     best = fit_with_progress(*hull, tolerance, spans);
   } catch (const ShapeError& error) {
-    throw ShapeError(a.file + ": " + error.what());
+    const std::string less = a.sag > 0 ? " (--tolerance less what the solid's triangles miss)" : "";
+    throw ShapeError(a.file + ": " + error.what() + less);
   }
   ShapeFileContent content{best.surfaces, std::nullopt};
   MassProperties mass = best.shape->mass;
@@ -196,11 +197,9 @@ void fit_mesh(const FitArguments& a, const TriangleMesh& raw) {
   const auto shape = make_shape(a.output, content.surfaces, content.gyration);
   if (keep_inertia) mass.inertia = own.inertia / own.volume * mass.volume;
   write_whole(a.output, write_shape(content));
-  size_t points = 0;
-  for (const NurbsSurface& s : content.surfaces) points += s.points.size();
   std::printf(
       "%s: %s; %zu patches, %zu control points in the file, where patches repeat the edges they share\n",
-      a.output.c_str(), best.kind.c_str(), content.surfaces.size(), points);
+      a.output.c_str(), best.kind.c_str(), content.surfaces.size(), control_points(content.surfaces));
   std::printf("distance from the hull: %.3g %% outward, %.3g %% inward of its radius %.6g (bounds)\n",
               100 * best.distance.outward / best.radius, 100 * best.distance.inward / best.radius,
               best.radius);
@@ -232,10 +231,17 @@ std::vector<Vec3> sample(const Shape& shape) {
   return points;
 }
 
-size_t control_points(const std::vector<NurbsSurface>& surfaces) {
-  size_t count = 0;
-  for (const NurbsSurface& s : surfaces) count += s.points.size();
-  return count;
+// Why there is no body of fewer control points.
+std::string why_no_simpler(const Shape& shape, const std::string& tolerance) {
+  const size_t own = control_points(shape.surfaces);
+  const std::string count = std::to_string(own);
+  if (shape.proofs.sphere)
+    return "nothing is simpler: it is a sphere, of " + count +
+           " control points, whose contacts are by a formula";
+  if (own <= kLeastPoints)
+    return "nothing is simpler: it has " + count + " control points, smooth bodies of any form have " +
+           std::to_string(kLeastPoints) + " at least, and no special one of fewer is within " + tolerance;
+  return "no body of fewer than its " + count + " control points is within " + tolerance;
 }
 
 void simplify(const FitArguments& a) {
@@ -248,23 +254,29 @@ void simplify(const FitArguments& a) {
   std::vector<NurbsSurface> about_origin = read->surfaces;
   transform(about_origin, Mat3::Identity(), -place);
   const auto shape = make_shape(a.file, about_origin);
+  const size_t own = control_points(shape->surfaces);
+  const auto fail = [&] { throw ShapeError(a.file + ": " + why_no_simpler(*shape, a.tolerance)); };
+  if (shape->proofs.sphere) fail();
+  std::unique_ptr<ConvexHull> hull;
   HullFit best;
   double sag = 0;  // of the body over the hull of its samples
   try {
-    const ConvexHull hull(sample(*shape));
+    hull = std::make_unique<ConvexHull>(sample(*shape));
     const double radius = shape->bounding_radius;
-    sag = hull_distance(*shape, hull, 0.01 * tolerance * radius).outward / radius;
+    sag = hull_distance(*shape, *hull, 0.01 * tolerance * radius).outward / radius;
     if (sag > 0.5 * tolerance)
-      throw ShapeError("the tolerance of " + format("%.3g", 100 * tolerance) +
-                       " % is finer than the body is sampled, " + format("%.2g", 200 * sag) + " % at least");
-    best = fit_with_progress(hull, tolerance - sag, spans_of(a.patches), control_points(shape->surfaces) - 1);
+      throw ShapeError("the tolerance of " + a.tolerance + " is finer than the body is sampled, " +
+                       format("%.2g", 200 * sag) + " % at least");
   } catch (const ShapeError& error) {
     throw ShapeError(a.file + ": " + error.what());
   }
-  if (control_points(best.surfaces) >= control_points(shape->surfaces))
-    throw ShapeError(a.file + ": no body of fewer than its " +
-                     std::to_string(control_points(shape->surfaces)) + " control points is within " +
-                     format("%.3g", 100 * tolerance) + " % (bounds)");
+  const int spans = spans_of(a.patches);
+  try {
+    best = fit_with_progress(*hull, tolerance - sag, spans, own - 1);
+  } catch (const ShapeError&) {
+    fail();
+  }
+  if (control_points(best.surfaces) >= own) fail();
   ShapeFileContent content{best.surfaces, std::nullopt};
   if ((read->gyration - read->mass.inertia / read->mass.volume).norm() > 1e-9 * read->gyration.norm())
     content.gyration = read->gyration;  // given in the file
@@ -272,7 +284,7 @@ void simplify(const FitArguments& a) {
   make_shape(a.output, content.surfaces, content.gyration);  // it loads
   write_whole(a.output, write_shape(content));
   std::printf("%s: %s; %zu control points in place of %zu\n", a.output.c_str(), best.kind.c_str(),
-              control_points(best.surfaces), control_points(shape->surfaces));
+              control_points(best.surfaces), own);
   std::printf("distance from %s: %.3g %% outward, %.3g %% inward of its radius (bounds)\n", a.file.c_str(),
               100 * best.distance.outward / best.radius, 100 * (best.distance.inward / best.radius + sag));
   print_differences("the body", best.shape->mass, shape->mass, best.radius);

@@ -507,11 +507,26 @@ class Fit(unittest.TestCase):
         self.assertIn("ERROR: ", again.stderr)
 
     def test_simplify_of_the_simplest(self):
-        """A body of six patches of one span: nothing has fewer points, and that is what is said."""
-        made = call("make", "pebble", "--seed", "3", self.place / "fine.json")
+        """Where nothing has fewer points that is what is said, with the tolerance as given, and no success before."""
+        for kind, points in (("sphere", 150), ("egg --radius 1 --blunt 1 --pointed 1.5", 54), ("pebble --seed 3", 96),
+                             ("capsule --radius 1 --length 2", 72)):
+            with self.subTest(kind=kind):
+                call("make", *kind.split(), self.place / "fine.json").check_returncode()
+                run = call("simplify", self.place / "fine.json", "--tolerance", "10%", "-o", self.out)
+                self.assert_one_error(run, f"fine.json: nothing is simpler: it {'is' if kind == 'sphere' else 'has'} ")
+                self.assertIn(f" {points} control points", run.stderr)
+                self.assertNotIn("within", run.stdout)
+                if kind != "sphere":
+                    self.assertIn("of fewer is within 10%", run.stderr)
+
+    def test_simplify_counts_points_of_every_kind_of_body(self):
+        """A polyhedron with rounded edges of more points once ended the search for splines of fewer."""
+        made = call("make", "rounded-polyhedron", "--solid", "dodecahedron", "--rounding", "0.3", self.place / "fine.json")
         self.assertEqual(made.returncode, 0, made.stderr)
-        self.assert_one_error(call("simplify", self.place / "fine.json", "--tolerance", "1%", "-o", self.out),
-                              "no body of at most 95 control points")
+        run = call("simplify", self.place / "fine.json", "--tolerance", "2%", "-o", self.out)
+        self.assertEqual(run.returncode, 0, run.stderr)
+        points, own = map(int, re.search(r"(\d+) control points in place of (\d+)\n", run.stdout).groups())
+        self.assertLess(2 * points, own)
 
 
 if __name__ == "__main__":
