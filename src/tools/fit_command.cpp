@@ -22,6 +22,8 @@ constexpr double kLeastExtent = 1e-29, kMostExtent = 1e29;  // a shape file's ar
 constexpr double kFarthest = 1e9;                           // of the extent: distance from the origin
 constexpr double kSurelyKept = 10, kFarthestKept = 1e3;     // radii from the origin at which a body is left
 constexpr double kLeastExcess = 1e-12;  // of the radius: no tolerance of a contact is finer
+// Volume of a hull beyond its mesh's, over that: of solids that are not convex, and of which that is warned.
+constexpr double kSomeAdded = 0.01, kMuchAdded = 0.1;
 constexpr int kSampleGrid =
     64;  // per patch parameter of a body to simplify, over all Bezier patches of a side
 
@@ -177,8 +179,15 @@ void fit_mesh(const FitArguments& a, const TriangleMesh& raw) {
   HullFit best;
   try {
     hull = std::make_unique<ConvexHull>(mesh.points);
+    const double added = hull->properties().volume / own.volume - 1;
     std::printf("convex hull: %zu vertices, adds %.3g %% to the mesh's volume of %.6g\n",
-                hull->mesh().points.size(), 100 * (hull->properties().volume / own.volume - 1), own.volume);
+                hull->mesh().points.size(), 100 * added, own.volume);
+    if (!a.inexact.empty())
+      std::printf("not exact: %s; fitted\n",
+                  added > kSomeAdded ? "the solid is not convex" : a.inexact.c_str());
+    if (added > kMuchAdded)
+      print_warnings({a.file + ": is not convex: its convex hull has " + format("%.3g", 100 * added) +
+                      " % more volume, and the body made is that of the hull"});
     best = fit_with_progress(*hull, tolerance, spans);
   } catch (const ShapeError& error) {
     const std::string less = a.sag > 0 ? " (--tolerance less what the solid's triangles miss)" : "";

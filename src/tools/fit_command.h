@@ -11,6 +11,7 @@ namespace nurbs {
 
 struct FitArguments {
   std::string file, output, tolerance = "1%", patches, keep, piece;
+  std::string inexact;  // of a solid: why its faces are not taken as they are
   double sag =
       0;  // share of the radius by which the mesh may miss what it stands for; taken off the tolerance
 };

@@ -146,10 +146,9 @@ void import(const Arguments& a) {
         {a.file + ": " +
          counted(solid.beside, "face that belongs to no solid is", "faces that belong to no solid are") +
          " left out"});
-  const std::string why = take_exact(a, solid);
-  if (why.empty()) return;
-  std::printf("not exact: %s; fitted\n", why.c_str());
   FitArguments f;
+  f.inexact = take_exact(a, solid);
+  if (f.inexact.empty()) return;
   f.file = a.file;
   f.output = a.output;
   f.tolerance = a.tolerance;

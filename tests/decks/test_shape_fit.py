@@ -528,6 +528,19 @@ class Fit(unittest.TestCase):
         points, own = map(int, re.search(r"(\d+) control points in place of (\d+)\n", run.stdout).groups())
         self.assertLess(2 * points, own)
 
+    def test_hulls_of_much_more_volume_are_warned_of(self):
+        u, v = (x.ravel() for x in np.meshgrid(np.arange(32), np.arange(16), indexing="ij"))
+        ring = 1 + 0.4 * np.cos(v * np.pi / 8)
+        points = np.stack([ring * np.cos(u * np.pi / 16), ring * np.sin(u * np.pi / 16), 0.4 * np.sin(v * np.pi / 8)], axis=1)
+        corner = [(u + a) % 32 * 16 + (v + b) % 16 for a, b in ((0, 0), (1, 0), (1, 1), (0, 1))]
+        faces = np.vstack([np.stack([corner[0], corner[k], corner[k + 1]], axis=1) for k in (1, 2)])
+        run = call("fit", self.mesh(meshes.binary_stl(points, faces)), "--tolerance", "10%", "-o", self.out)
+        self.assertEqual(run.returncode, 0, run.stderr)
+        added = re.search(r"adds (\S+) %", run.stdout)[1]
+        self.assertRegex(run.stderr, rf"\AWARNING: [^\n]*mesh.stl: is not convex: its convex hull has {added} % more volume[^\n]*\n\Z")
+        ball = call("fit", self.mesh(meshes.binary_stl(*meshes.icosphere(3))), "-o", self.out)
+        self.assertEqual((ball.returncode, ball.stderr), (0, ""))
+
 
 if __name__ == "__main__":
     unittest.main()
