@@ -317,11 +317,12 @@ void FixWallNurbs::setup(int vflag) {
   checked_particles_ = atom->natoms;
   post_force(vflag);
   if (all(lmp).back() == this) sum_mesh_forces();
-  warn_deep("at the start of the run");
+  warn_deep(stages_.deep(), "at the start of the run");
+  last_tag_ = atom->tag_max();
 }
 
-void FixWallNurbs::warn_deep(const char* when) {
-  nurbs_host::warn_deep(lmp, stages_.deep(), name_of(*this), when,
+void FixWallNurbs::warn_deep(const nurbs::DeepContacts& contacts, const char* when) {
+  nurbs_host::warn_deep(lmp, contacts, name_of(*this), when,
                         "do particles reach through the wall, or is its normal reversed?",
                         last_deep_warning_);
 }
@@ -517,6 +518,9 @@ void FixWallNurbs::post_force(int) {
   for (int k = 0; k < 3; ++k)
     if (domain->periodicity[k]) step.period[k] = nurbs_host::box_edge(*domain, k);
   step.settings = settings_;
+  const bool inserted = neighbor->ago == 0 && atom->natoms > checked_particles_;
+  if (inserted) step.tags = atom->tag;
+  step.last_tag = last_tag_;
   step.laws = &law_;
   step.model = models_.get();
   if (listed()) {
@@ -530,9 +534,10 @@ void FixWallNurbs::post_force(int) {
     step.wall_normal = normal_;
     stages_.compute(step);
   }
-  if (neighbor->ago == 0 && atom->natoms > checked_particles_) {
+  if (inserted) {
     checked_particles_ = atom->natoms;
-    warn_deep("after an insertion");
+    warn_deep(stages_.deep_inserted(), "particles just inserted have");
+    last_tag_ = atom->tag_max();
   }
   for (const int i : stages_.loaded()) {
     const nurbs::ContactStages::Sum sum = stages_.sum(i);

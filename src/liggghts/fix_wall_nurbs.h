@@ -113,7 +113,7 @@ class FixWallNurbs : public Fix {
   void warn_periodic();
   void warn_mesh_types();
   void warn_time_step();
-  void warn_deep(const char* when);
+  void warn_deep(const nurbs::DeepContacts& contacts, const char* when);
 
   using Kind = nurbs::SurfaceWall::Kind;
   Kind kind_ = Kind::plane;
@@ -138,6 +138,7 @@ class FixWallNurbs : public Fix {
   bool was_another_kind_ = false;  // in the restart that is read
   bool periodic_warned_ = false, types_warned_ = false;
   bigint checked_particles_ = 0;  // when deep contacts were last looked for
+  int last_tag_ = 0;              // the largest one then
   std::string last_warning_, last_deep_warning_, last_model_warning_;
 };
 

@@ -44,8 +44,8 @@ inline nurbs::ContactSettings contacts_only() {
   return settings;
 }
 
-// Contacts at the start of a run, or `when` particles were inserted, that are too deep for a penalty law, of
-// all ranks: one warning, not repeated while `last` is the same. Collective.
+// Contacts that are too deep for a penalty law, of all ranks, at the start of a run or of particles just
+// inserted, as `when` says: one warning, not repeated while `last` is the same. Collective.
 void warn_deep(LAMMPS* lmp, const nurbs::DeepContacts& mine, const std::string& user, const std::string& when,
                const std::string& hint, std::string& last);
 

@@ -356,6 +356,8 @@ void PairGranNurbs::compute_force(int eflag, int vflag, int addflag) {
   step.changed = changed_;
   step.ledger = ledger_;
   step.settings = settings_;
+  if (inserted) step.tags = atom->tag;
+  step.last_tag = last_tag_;
   step.types = atom->type;
   step.type_count = ntypes_ + 1;
   step.laws = law_table_.data();
@@ -365,10 +367,12 @@ void PairGranNurbs::compute_force(int eflag, int vflag, int addflag) {
   if (evflag || storeContactForces() || storeContactForcesStress())
     stages_.for_each_contact([this](const nurbs::ContactView& contact) { tally(contact); });
   keep_case();
-  if (step.setup || inserted)
-    nurbs_host::warn_deep(lmp, stages_.deep(), kUser,
-                          step.setup ? "at the start of the run" : "after an insertion",
+  if (step.setup || inserted) {
+    nurbs_host::warn_deep(lmp, step.setup ? stages_.deep() : stages_.deep_inserted(), kUser,
+                          step.setup ? "at the start of the run" : "particles just inserted have",
                           "do particles overlap?", last_deep_warning_);
+    last_tag_ = atom->tag_max();
+  }
   if (storeContactForces()) fix_contact_forces()->do_forward_comm();
   if (storeContactForcesStress()) fix_contact_forces_stress()->do_forward_comm();
 }

@@ -125,6 +125,7 @@ class PairGranNurbs : public PairGran {
   std::uint64_t fingerprint_ = 0;  // at the end of the last run, 0 before the first
   bool changed_ = false;
   bigint checked_particles_ = 0;  // when the time step was last checked
+  int last_tag_ = 0;              // the largest one then
   std::string last_warning_, last_deep_warning_, last_sphere_warning_;
 };
 

@@ -312,12 +312,16 @@ void ContactStages::note_depth(int a, int b, double gap) {
   const double radius = smaller_radius(a, b);
   if (!(-gap > DeepContacts::kDepth * radius)) return;
   const double depth = -gap / radius;
-  deep_.count += share(a, b);
-  deep_.deepest = std::max(deep_.deepest, depth);
+  const auto add = [&](DeepContacts& to) {
+    to.count += share(a, b);
+    to.deepest = std::max(to.deepest, depth);
+  };
+  add(deep_);
+  const auto inserted = [this](int i) { return i >= 0 && step_.tags[i] > step_.last_tag; };
+  if (step_.tags != nullptr && (inserted(a) || inserted(b))) add(deep_inserted_);
   const bool flat = record(b).flat != 0 || (a >= 0 && record(a).flat != 0);
   if (step_.setup || depth <= (flat ? DeepContacts::kFlatInRun : DeepContacts::kRoundInRun)) return;
-  deep_in_run_.count += share(a, b);
-  deep_in_run_.deepest = std::max(deep_in_run_.deepest, depth);
+  add(deep_in_run_);
 }
 
 // --- stages (c) to (f)
@@ -334,7 +338,7 @@ void ContactStages::compute(const Step& step) {
 void ContactStages::begin_step(const Step& step) {
   step_ = step;
   counts_ = ContactCounts{};
-  deep_ = DeepContacts{};
+  deep_ = deep_inserted_ = DeepContacts{};
   if (step.setup) deep_in_run_ = DeepContacts{};
   unresolved_ = Unresolved{};
   fresh_.clear();

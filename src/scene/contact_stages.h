@@ -98,6 +98,10 @@ class ContactStages {
     const int* types = nullptr;
     int type_count = 0;
     const ContactCoefficients* laws = nullptr;
+    // The host's numbers of the bodies; those beyond the last one have just been inserted. Without: none
+    // have.
+    const int* tags = nullptr;
+    int last_tag = 0;
     // The wall's surface, where it is a cylinder; a model asks how it is bent.
     struct Cylinder {
       Vec3 origin = Vec3::Zero(), axis = Vec3::UnitZ();
@@ -171,6 +175,7 @@ class ContactStages {
 
   const ContactCounts& counts() const { return counts_; }
   const DeepContacts& deep() const { return deep_; }
+  const DeepContacts& deep_inserted() const { return deep_inserted_; }  // those of inserted bodies
   const DeepContacts& deep_in_run() const { return deep_in_run_; }
   const Unresolved& unresolved() const { return unresolved_; }  // the first of the last compute
   EnergyLedger& dissipated() { return dissipated_; }
@@ -359,7 +364,7 @@ class ContactStages {
   double neighbour_weight_ = 0;
   Step step_;
   ContactCounts counts_;
-  DeepContacts deep_, deep_in_run_;
+  DeepContacts deep_, deep_inserted_, deep_in_run_;
   Unresolved unresolved_;
   EnergyLedger dissipated_;
 };

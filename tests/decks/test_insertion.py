@@ -271,6 +271,23 @@ class Where(Decks):
             self.assertGreater(len(frame["x"]), 100)
             self.assertGreater(least_separation(frame)[0], 0.999)
 
+    def test_deep_contacts_of_inserted_particles(self):
+        """Those of particles that were there before are not counted."""
+        atoms = [(k + 1, 1, 2, 1.0, 1.0, x, 0.0, z, 1.0, 0.0, 0.0, 0.0) for k, (x, z) in enumerate([(-3, 3), (-2, 3), (3, 0.5)])]
+        text = header().replace("create_box 1 box", "read_data in.data")
+        text += "fix w all wall/nurbs plane 0 0 0 0 0 1 kn 1e7 kt 5e6 mu 0.4\n" + PLAIN
+        far, amid = "region ins block -4.9 4.9 -4.9 4.9 6 9.9 units box\n", "region ins block 2.9 3.1 -0.1 0.1 0.05 0.15 units box\n"
+        data = deck.data_file(atoms, box=((-5, 5), (-5, 5), (0, 10)))
+        for region, check, found in ((far, "yes", []), (amid, "no", [1, 1])):
+            for ranks in (1, 2):
+                with self.subTest(found=found, ranks=ranks):
+                    options = f"insert_every once overlapcheck {check} all_in no"
+                    run = self.run_deck(text + region + insert_pack("particles_in_region 1", "one", options) + "run 1\n",
+                                        ranks=ranks, more={"in.data": data})
+                    self.assertEqual(run.thermo["Atoms"][-1], 4)
+                    deep = re.findall(r"WARNING: .* (.* contacts deeper) than 10 %.*radius: (\d+), deepest", run.screen)
+                    self.assertEqual(deep, [("run contacts deeper", "1")] * 2 + [("have contacts deeper", str(n)) for n in found])
+
     @staticmethod
     def face():
         face = "solid f\n"
