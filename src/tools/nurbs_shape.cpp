@@ -141,8 +141,13 @@ class Options {
     return command_->get_option(name)->results()[0];
   }
 
+  double length(const std::string& name) const { return numbers(name, 1, kLeastLength, kMostLength)[0]; }
+  double length(const std::string& name, double otherwise) const {
+    return has(name) ? length(name) : otherwise;
+  }
+
   Vec3 axes() const {
-    const std::vector<double> a = numbers("--axes", 3, kLeast, kMost);
+    const std::vector<double> a = numbers("--axes", 3, kLeastLength, kMostLength);
     return {a[0], a[1], a[2]};
   }
 
@@ -159,6 +164,7 @@ class Options {
   }
 
   static constexpr double kLeast = 1e-150, kMost = 1e150;
+  static constexpr double kLeastLength = 1e-29, kMostLength = 1e29;  // a shape file's extents: 1e-30 to 1e30
 
  private:
   static bool is_number_like(const std::string& text) {
@@ -205,9 +211,9 @@ class Options {
     if (error != std::errc() || end != text.data() + text.size())
       fail(name + " '" + text + "' is not a number");
     if (!(value >= lo && value <= hi)) {
-      const bool any_positive = lo == kLeast && hi == kMost;
+      const bool any_positive = lo == kLeast || lo == kLeastLength;
       fail(name + " is " + text + ", must be " +
-           (any_positive && !(value > hi) ? "> 0" : "in " + format("%g", lo) + ".." + format("%g", hi)));
+           (any_positive && value <= 0 ? "> 0" : "in " + format("%g", lo) + ".." + format("%g", hi)));
     }
     return value;
   }
@@ -229,7 +235,7 @@ std::string fit_note(double error) {
 }
 
 Body make_sphere(const Options& options) {
-  return {exact_ellipsoid(Vec3::Constant(options.positive("--radius", 1))), ""};
+  return {exact_ellipsoid(Vec3::Constant(options.length("--radius", 1))), ""};
 }
 
 Body make_ellipsoid(const Options& options) {
@@ -241,7 +247,7 @@ Body make_box(const Options& options) {
 }
 
 Body make_revolved(const Options& options) {
-  const double equatorial = options.positive("--equatorial"), polar = options.positive("--polar");
+  const double equatorial = options.length("--equatorial"), polar = options.length("--polar");
   return {revolved_ellipsoid(equatorial, polar), ""};
 }
 
@@ -292,11 +298,9 @@ std::uint64_t whole(const Options& options, const std::string& name, double othe
 }
 
 constexpr double kMostSeed = 9e15;
-constexpr double kLeastPebble = 1e-29,
-                 kMostPebble = 1e29;  // radius: a shape file's extents are 1e-30 to 1e30
 
 Body make_pebble(const Options& options) {
-  const double radius = options.positive("--radius", 1);
+  const double radius = options.length("--radius", 1);
   if (options.has("--seed")) {
     PebbleForm form;
     form.radius = radius;
@@ -318,30 +322,53 @@ Body outward(const Options& options, Surfaces surfaces) {
 }
 
 Body make_capsule(const Options& options) {
-  const double radius = options.positive("--radius");
-  return {capsule(radius, options.positive("--length")), ""};
+  const double radius = options.length("--radius");
+  return {capsule(radius, options.length("--length")), ""};
+}
+
+// The rim's rounding, which must leave some of the body.
+double rim_below(const Options& options, double radius) {
+  const double rim = options.length("--rim");
+  if (!(rim < radius))
+    options.fail("--rim is " + format("%g", rim) + ", must be less than --radius, " + format("%g", radius));
+  return rim;
+}
+
+// The radius of domes, of a half sphere at the least.
+double cap_from(const Options& options, double radius) {
+  const double cap = options.length("--cap");
+  if (!(cap >= radius))
+    options.fail("--cap is " + format("%g", cap) + ", must be --radius, " + format("%g", radius) +
+                 ", at least");
+  return cap;
 }
 
 Body make_tablet(const Options& options) {
-  const double radius = options.positive("--radius"), rim = options.positive("--rim");
-  if (!options.has("--cap")) return {tablet(radius, options.positive("--height"), rim), ""};
-  const double band = options.numbers("--height", 1, 0, Options::kMost)[0];
-  return {biconvex_tablet(radius, band, options.positive("--cap"), rim), ""};
+  const double radius = options.length("--radius"), rim = rim_below(options, radius);
+  if (!options.has("--cap")) {
+    const double height = options.length("--height");
+    if (!(rim <= 0.5 * height))
+      options.fail("--rim is " + format("%g", rim) + ", must be at most half of --height, " +
+                   format("%g", 0.5 * height));
+    return {tablet(radius, height, rim), ""};
+  }
+  const double band = options.numbers("--height", 1, 0, Options::kMostLength)[0];
+  return {biconvex_tablet(radius, band, cap_from(options, radius), rim), ""};
 }
 
 Body make_lens(const Options& options) {
-  const double radius = options.positive("--radius"), cap = options.positive("--cap");
-  return {lens(radius, cap, options.positive("--rim")), ""};
+  const double radius = options.length("--radius"), cap = cap_from(options, radius);
+  return {lens(radius, cap, rim_below(options, radius)), ""};
 }
 
 Body make_egg(const Options& options) {
-  const double radius = options.positive("--radius"), blunt = options.positive("--blunt");
-  return {egg(radius, blunt, options.positive("--pointed")), ""};
+  const double radius = options.length("--radius"), blunt = options.length("--blunt");
+  return {egg(radius, blunt, options.length("--pointed")), ""};
 }
 
 Body make_rounded_box(const Options& options) {
   const Vec3 axes = options.axes();
-  const double rounding = options.positive("--rounding");
+  const double rounding = options.length("--rounding");
   if (rounding > axes.minCoeff())
     options.fail("--rounding is " + format("%g", rounding) + ", must be at most the least half edge, " +
                  format("%g", axes.minCoeff()));
@@ -353,9 +380,9 @@ constexpr int kMostFacets = 300;
 Body make_rounded_polyhedron(const Options& options) {
   if (options.has("--solid") == options.has("--mesh"))
     options.fail("one of --solid and --mesh says which polyhedron");
-  const double rounding = options.positive("--rounding");
+  const double rounding = options.length("--rounding");
   if (options.has("--solid")) {
-    const double radius = options.positive("--radius", 1);
+    const double radius = options.length("--radius", 1);
     const std::vector<HalfSpace> faces = platonic_solid(options.text("--solid"), radius);
     if (faces.empty())
       options.fail("--solid is " + options.text("--solid") +
@@ -555,7 +582,7 @@ void make_pebbles(const Options& options) {
   options.numbers("--count", 1, 1, 100000);
   const std::uint64_t count = whole(options, "--count", 1, 1, 100000),
                       seed = whole(options, "--seed", 1, 0, kMostSeed);
-  const double radius = options.number("--radius", 1, kLeastPebble, kMostPebble);
+  const double radius = options.length("--radius", 1);
   const auto both = [](double lo, double hi) { return std::array{lo, hi}; };
   const auto roundness = options.has("--roundness") ? range(options, "--roundness", 0, 0) : both(0.3, 0.8);
   const auto elongation = options.has("--elongation") ? range(options, "--elongation", 0, 0.2) : both(0.6, 1);
