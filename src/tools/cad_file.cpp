@@ -34,6 +34,8 @@
 #include <Geom_SweptSurface.hxx>
 #include <Geom_TrimmedCurve.hxx>
 #include <IGESControl_Reader.hxx>
+#include <IGESData_GlobalSection.hxx>
+#include <IGESData_IGESModel.hxx>
 #include <Message.hxx>
 #include <Message_Messenger.hxx>
 #include <Message_Printer.hxx>
@@ -45,6 +47,7 @@
 #include <ShapeProcess_Context.hxx>
 #include <Standard_Failure.hxx>
 #include <StepRepr_RepresentationItem.hxx>
+#include <TColStd_SequenceOfAsciiString.hxx>
 #include <TCollection_HAsciiString.hxx>
 #include <TopExp.hxx>
 #include <TopExp_Explorer.hxx>
@@ -563,6 +566,16 @@ TopoDS_Shape transfer(XSControl_Reader& reader, const std::string& file, const s
   return reader.OneShape();
 }
 
+void name_unit(std::vector<CadSolid>& solids, const std::string& unit) {
+  for (CadSolid& solid : solids) solid.unit = unit;
+}
+
+std::string step_unit(STEPControl_Reader& reader) {
+  TColStd_SequenceOfAsciiString lengths, angles, solid_angles;
+  reader.FileUnits(lengths, angles, solid_angles);
+  return lengths.IsEmpty() ? "" : lengths.First().ToCString();
+}
+
 std::vector<CadSolid> read_step(const std::string& file, double scale) {
   check_head(file, "ISO-10303-21", "STEP");
   STEPControl_Reader with_bounds, without;
@@ -572,10 +585,12 @@ std::vector<CadSolid> read_step(const std::string& file, double scale) {
     add_bounds_of_spheres(false);
     content = sound_ones(content, transfer(without, file, "STEP"));
   }
-  return solids_of(content, scale, [&](const TopoDS_Shape& solid) {
+  std::vector<CadSolid> solids = solids_of(content, scale, [&](const TopoDS_Shape& solid) {
     const std::string name = step_name(with_bounds, solid);
     return name.empty() && without.NbShapes() > 0 ? step_name(without, solid) : name;
   });
+  name_unit(solids, step_unit(with_bounds));
+  return solids;
 }
 
 std::string no_name(const TopoDS_Shape&) {
@@ -589,7 +604,10 @@ std::vector<CadSolid> read_iges(const std::string& file, double scale) {
   std::getline(in, line);
   if (line.size() < 73 || line[72] != 'S') throw ShapeError("is no IGES file");
   IGESControl_Reader reader;
-  return solids_of(transfer(reader, file, "IGES"), scale, no_name);
+  std::vector<CadSolid> solids = solids_of(transfer(reader, file, "IGES"), scale, no_name);
+  const Handle(TCollection_HAsciiString) unit = reader.IGESModel()->GlobalSection().UnitName();
+  if (!unit.IsNull()) name_unit(solids, unit->ToCString());
+  return solids;
 }
 
 std::vector<CadSolid> read_brep(const std::string& file, double scale) {

@@ -15,6 +15,7 @@ namespace nurbs {
 // One solid. Lengths are `scale` times the millimetres (BREP: units) of the file.
 struct CadSolid {
   std::string name;  // as in the file, may be empty
+  std::string unit;  // of length in the file; empty: it names none
   int faces = 0, cavities = 0;
   int beside = 0;  // faces of the file that belong to no solid, and to none here
   Vec3 extent;     // of its bounding box

@@ -32,6 +32,10 @@ std::string format(const char* pattern, double value) {
   return text;
 }
 
+std::string format_box(const Vec3& extent) {
+  return format("%.4g x ", extent[0]) + format("%.4g x ", extent[1]) + format("%.4g", extent[2]);
+}
+
 void write_whole(const std::string& file, const std::string& text) {
   if (is_special(file)) {
     std::ofstream out(file, std::ios::binary);

@@ -7,6 +7,8 @@
 #include <string>
 #include <vector>
 
+#include "nurbs/types.h"
+
 namespace nurbs {
 
 struct UsageError : std::runtime_error {
@@ -39,6 +41,7 @@ Command add_export(CLI::App& app);
 Command add_view(CLI::App& app);
 
 std::string format(const char* pattern, double value);
+std::string format_box(const Vec3& extent);  // "1 x 2 x 3"
 
 // Writes beside `file` and renames, so that `file` is whole or untouched; into it if it is a pipe or a
 // device.

@@ -5,6 +5,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <cctype>
 #include <cerrno>
 #include <cmath>
 #include <csignal>
@@ -36,7 +37,7 @@ std::string counted(int n, const char* one, const char* many) {
 
 std::string describe(const CadSolid& solid) {
   return (solid.name.empty() ? "" : "'" + solid.name + "', ") + counted(solid.faces, "face", "faces") + ", " +
-         format("%.4g", solid.extent.norm()) + " across";
+         format_box(solid.extent);
 }
 
 std::string list(const std::vector<CadSolid>& solids) {
@@ -137,7 +138,10 @@ void import(const Arguments& a) {
   const CadSolid& solid = chosen(a, solids);
   if (!(solid.extent.maxCoeff() > 0 && std::isfinite(solid.extent.norm())))
     throw ShapeError(a.file + ": the solid has no finite extent");
-  std::printf("%s: solid of %s\n", a.file.c_str(), describe(solid).c_str());
+  const bool is_name = std::isalpha(static_cast<unsigned char>(a.unit[0])) != 0;
+  std::printf("%s: solid of %s in %s; the file %s\n", a.file.c_str(), describe(solid).c_str(),
+              (is_name ? a.unit : "units of " + a.unit + " mm").c_str(),
+              solid.unit.empty() ? "names no unit" : ("is in " + solid.unit).c_str());
   if (solid.cavities > 0)
     print_warnings(
         {a.file + ": " + counted(solid.cavities, "cavity inside is", "cavities inside are") + " left out"});

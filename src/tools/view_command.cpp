@@ -17,6 +17,7 @@
 #include <utility>
 #include <vector>
 
+#include "body/support.h"
 #include "io/shape_file.h"
 #include "io/vtu_file.h"
 #include "nurbs/tolerances.h"
@@ -28,6 +29,7 @@ namespace {
 
 struct Arguments {
   std::string file, output, tolerance = "0.1%", unit = "mm";
+  bool has_tolerance = false, has_unit = false;  // given
 };
 
 constexpr double kSingle = 6e-8, kStepShare = 0.1;  // round-off of STL; of the tolerance, at most
@@ -143,6 +145,13 @@ std::string stl(const Shape& shape, const Vec3& place, double error, size_t* cou
   return out + body;
 }
 
+Vec3 box_extent(const Shape& shape) {
+  Vec3 extent;
+  for (int k = 0; k < 3; ++k)
+    extent[k] = find_support(shape, Vec3::Unit(k)).point[k] - find_support(shape, -Vec3::Unit(k)).point[k];
+  return extent;
+}
+
 void export_step(const Arguments& a, const Shape& shape, double unit) {
   const std::string draft = a.output + "." + std::to_string(getpid()) + ".tmp";
   double volume = 0;
@@ -153,8 +162,8 @@ void export_step(const Arguments& a, const Shape& shape, double unit) {
     std::remove(draft.c_str());
     throw ShapeError(a.output + ": " + error.what());
   }
-  std::printf("%s: solid of %.6g mm^3, %.4g mm across\n", a.output.c_str(), volume,
-              2 * unit * shape.bounding_radius);
+  std::printf("%s: solid of %.6g mm^3, %s mm\n", a.output.c_str(), volume,
+              format_box(unit * box_extent(shape)).c_str());
 }
 
 void export_shape(const Arguments& a) {
@@ -163,6 +172,10 @@ void export_shape(const Arguments& a) {
   const bool is_step = kind == ".step" || kind == ".stp";
   if (kind != ".stl" && kind != ".vtu" && !is_step)
     throw UsageError("export: ending '" + kind + "' is not known; -o takes .stl, .vtu, .step or .stp");
+  if (a.has_unit && !is_step)
+    throw UsageError("export: --unit is for .step and .stp: a " + kind + " file's lengths are the shape's");
+  if (a.has_tolerance && kind != ".stl")
+    throw UsageError("export: --tolerance is for .stl: a " + kind + " file is exact");
   const double unit = parse_unit("export", a.unit);
   const auto shape = load(a.file);
   if (is_step) return export_step(a, *shape, unit);
@@ -247,7 +260,11 @@ Command add_export(CLI::App& app) {
           "of STEP: the shape file's unit of length, um, mm, cm, m, in or a number of mm; default mm")
       ->type_name("U");
   command->footer("Example: nurbs-shape export grain.json --unit m -o grain.step\n");
-  return {command, [a] { export_shape(*a); }};
+  return {command, [a, command] {
+            a->has_tolerance = command->count("--tolerance") > 0;
+            a->has_unit = command->count("--unit") > 0;
+            export_shape(*a);
+          }};
 }
 
 Command add_view(CLI::App& app) {

@@ -273,6 +273,19 @@ class ShapeStep(unittest.TestCase):
         self.good("import", self.place / "mm.step", "--unit", "m", "-o", out)
         self.assertIn("solid of 24 mm^3", self.good("export", out, "--unit", "m", "-o", step))
 
+    def test_sizes_and_units_are_told(self):
+        """By import as by export."""
+        made, step, out = (self.place / name for name in ("made.json", "made.step", "out.json"))
+        self.good("make", "egg", "--radius", "3", "--blunt", "3", "--pointed", "4", "-o", made)
+        self.assertIn(", 60 x 60 x 70 mm\n", self.good("export", made, "--unit", "cm", "-o", step))
+        for unit, told in (("m", "0.06 x 0.06 x 0.07 in m"), ("10", "6 x 6 x 7 in units of 10 mm")):
+            self.assertIn(f" faces, {told}; the file is in millimetre\n", self.good("import", step, "--unit", unit, "-o", out))
+        metres = Step("SI_UNIT($,.METRE.)")
+        metres.polyhedron(*prism(4, 2.0, 3.0))
+        self.assertIn("4000 x 4000 x 3000 in mm; the file is in metre\n", self.good("import", self.write("m.step", metres), "-o", out))
+        box = deck.ROOT / "tests/cases/cad-inner-wire.brep"
+        self.assertIn("in mm; the file names no unit\n", self.good("import", box, "-o", out))
+
     def test_several_solids_are_chosen_from(self):
         step, out = Step(), self.place / "out.json"
         step.polyhedron(*prism(4, 2.0, 3.0), name="post")

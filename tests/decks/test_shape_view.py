@@ -74,12 +74,12 @@ class View(unittest.TestCase):
         self.assertAlmostEqual(self.info("flatness S/I", ellipsoid), 1 / 2, 4)
 
     def test_picture_and_cells(self):
-        for name in ("egg.png", "egg.vtu"):
+        for name in ("egg.PNG", "egg.png", "egg.vtu"):
             run = call("view", self.shape, "-o", self.place / name)
             self.assertEqual(run.returncode, 0, run.stderr)
         self.assertTrue((self.place / "egg.png").read_bytes().startswith(b"\x89PNG"))
         self.assertIn("HigherOrderDegrees", (self.place / "egg.vtu").read_text(errors="replace"))
-        self.assertEqual(sorted(p.name for p in self.place.iterdir()), ["egg.json", "egg.png", "egg.vtu"])
+        self.assertEqual(sorted(p.name for p in self.place.iterdir()), ["egg.PNG", "egg.json", "egg.png", "egg.vtu"])
 
     def test_bad_requests(self):
         for arguments in (["view", self.shape, "-o", "a.gif"], ["export", self.shape, "-o", "a.3dm"],
@@ -89,6 +89,15 @@ class View(unittest.TestCase):
             self.assertEqual(run.returncode, 1)
             self.assertRegex(run.stderr, r"\AERROR: [^\n]*\n\Z")
             self.assertFalse((self.place / "a.stl").exists())
+
+    def test_options_of_another_kind_of_file(self):
+        """What a file takes no notice of is refused."""
+        for option, value, names in (("--unit", "m", ("a.stl", "a.vtu")), ("--tolerance", "1%", ("a.step", "a.STP", "a.vtu"))):
+            for name in names:
+                run = call("export", self.shape, option, value, "-o", self.place / name)
+                self.assertEqual(run.returncode, 1)
+                self.assertRegex(run.stderr, rf"\AERROR: export: {option} is for [^\n]*\n\Z")
+                self.assertFalse((self.place / name).exists())
 
 
 if __name__ == "__main__":
