@@ -31,6 +31,7 @@ constexpr double kInside = 0.97;       // of the way to a bound
 constexpr double kShortest = 1e-4;     // steps: nothing more is to be had
 constexpr double kReserve = 0.25;      // share of the least curvature that is wanted between places
 constexpr double kNewSlack = 0.1;      // of a place added, over its form's trace
+constexpr double kLeastPush = 0.5;     // outward bounds' weight over their distance from the hull
 constexpr double kFirstInside = 0.1;   // least slack of a place's inward bound at first, of the distance
 constexpr double kRegularised = 1e-9;  // of the conditions' block of the matrix
 
@@ -555,18 +556,20 @@ class InteriorPoint {
     return true;
   }
 
-  // Bounds both ways at the places, those outward of the weight of the others, the vertices' among them: the
-  // side with more of them would press the body to the other.
+  // Bounds both ways at the places, those outward of a weight with which all pushes at the hull cancel when
+  // it grows or shrinks: the vertices' and the curvature's would press the body to one side.
   void balance() {
     centring_ = true;
     for (Piece& piece : pieces_) {
       const Local net = local(gauge_, piece);
-      const double vertices = static_cast<double>(piece.vertices.size()),
-                   places = static_cast<double>(piece.places.size());
+      const double bounds =
+          1 + static_cast<double>(piece.vertices.size()) / static_cast<double>(piece.places.size());
       for (Place& s : piece.places) {
-        s.distance.weight = 1 + vertices / places;
+        const double outside = left(s, s.target, allowed_).value,
+                     inside = left_inside(s, s.target, allowed_).value;
+        s.distance.weight = outside * std::max(bounds / inside - 2 * kForms, kLeastPush);
         const double value = left_inside(s, net.dot(shares_[s.shares].col(0)), allowed_).value;
-        s.inside.s = std::max(value, kFirstInside * allowed_ / s.inward);
+        s.inside.s = std::max(value, kFirstInside * inside);
         s.inside.z = 1 / s.inside.s;
       }
     }
