@@ -11,7 +11,8 @@ constexpr int kPairMemorySize = 54;
 
 // Gap, normal and contact points of two particles. The rungs, each a function of pair_search.cpp: the budget
 // of the last proof and the bounding spheres (7 ns); spheres and ellipsoids in closed form (20 and 170 ns;
-// sphere_search.h, ellipsoid_search.h); the direction atlases (80 ns); the local model (65 ns);
+// sphere_search.h, ellipsoid_search.h), sphero-polyhedra by the distance of their cores (0.1 us where the
+// contact goes on; core_search.h); the direction atlases (80 ns); the local model (65 ns);
 // Newton from the last contact (0.25 us, 0.7 us next to a dent, 1.5 us over it, 1 us on sharp edges and
 // vertices; joint_newton.h, bridge_search.h, edge_search.h), where that is on a face or two straight creases
 // along their known direction (0.5 us; flat_search.h); a cold start (2 us); the

@@ -17,25 +17,27 @@
 //  1. Single point (ladder) with overlap delta > 0: try make_*_polygon with reach = max(kReach delta, the
 //     overlap at rest). count = 0: stay with the single point. Asking at the first touch is best: U is then
 //     nothing.
-//  2. Hand-over: polygon.factor = continuity_factor(U before / kn, polygon, state) keeps U continuous. Then
-//     relax(polygon, state, dt / time) brings it to 1 over some periods of the contact and returns the work
-//     / kn that this puts into the springs, to be booked: < 0 for factors above 1 (a corner that comes down
-//     flat: up to 4); > 0 for those below, where an undamped contact should keep its factor until it opens.
-//     A contact that opens (U = 0) starts again with 1.
+//  2. Hand-over: give_energy(U before / kn, ..) keeps U continuous. A polygon that would hold less is stiffer
+//     by its factor (a corner that comes down flat: up to 4), and relax(polygon, state, dt / time) brings
+//     that to 1 over some periods of the contact and returns the work / kn that this puts into the springs, <
+//     0, to be booked. In one that would hold more the reference plane stands back by a shift, in which
+//     nothing is felt: it is as stiff as any other and gives back what it took, where a small factor would
+//     let bodies sink into each other. The shift goes under bodies at rest. A contact that opens (U = 0)
+//     starts again.
 //  3. Every step: evaluate, then judge.
 //     keep:   forces from the state.
 //     open:   no point overlaps. Back to the single point and to 1.
 //     moved:  the points slid over the reference outline by more than `room`, or they belong to a ruled line,
 //             which rolls (points that stay behind on it would drive it on): remake. Book the jump
-//             stored_energy(new) - stored_energy(old), or take it up in the factor. It is of second order:
+//             stored_energy(new) - stored_energy(old), or take it up as in 2. It is of second order:
 //             none under a uniform gap, whatever the weights.
 //     tilted: some points are open, or it stands on a crease, so the body may touch elsewhere: compare with
 //             support_gap (one support search) by outgrown(); only if that says so, remake. That it does not
 //             holds for the way `still_holds`. Where all points
 //             of a face are closed it can't be: beside a face the body falls away.
-//     A remake takes kKeptReach. One that yields count = 0 hands back to a single point, its factor likewise.
+//     A remake takes kKeptReach. One that yields count = 0 hands back to a single point, likewise.
 //     What came to the surface within the step, as a face does whose other edge comes down, nothing has held
-//     before: taken up in the factor too, it would leave a contact as soft as the old one was shallow.
+//     before, and is added.
 //  4. match() tells from which old point every new one inherits its history. A spring xi_i is a displacement,
 //     its force w_i kt xi_i: copying it keeps the sum under a plain slide, whatever the weights.
 //
