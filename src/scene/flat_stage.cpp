@@ -23,6 +23,13 @@ BodyFrame frame_of(const BodyRecord& r, double scale, const Shape* shape) {
   return f;
 }
 
+// A body, or the wall.
+BodyFrame placed(const Bodies& bodies, const Vec3& wall, int i) {
+  if (i < 0) return plane_frame(wall);
+  const BodyArrays& arrays = bodies.arrays();
+  return frame_of(bodies.record(i), arrays.scale[i], arrays.shapes[arrays.shape[i]]);
+}
+
 void fill(const ContactPolygon& polygon, const PolygonState& state, const Vec3& offset, ContactBlock* points,
           ContactStages::Results* results) {
   double together = 0;
@@ -81,11 +88,9 @@ double ContactStages::clear_way(int a, int b, double* until) const {
 
 // The energy U / kn to a polygon, by its factor or its shift; its state then.
 PolygonState ContactStages::give(ContactPolygon* polygon, int a, int b, double energy) const {
-  const BodyArrays& arrays = step_.bodies->arrays();
-  const auto frame = [&](int i) {
-    return frame_of(record(i), arrays.scale[i], arrays.shapes[arrays.shape[i]]);
-  };
-  return give_energy(energy, kStiffest, a < 0 ? plane_frame(wall_frame(a)) : frame(a), frame(b), polygon);
+  const Vec3 wall = wall_frame(a);
+  return give_energy(energy, kStiffest, placed(*step_.bodies, wall, a), placed(*step_.bodies, wall, b),
+                     polygon);
 }
 
 // Energy that left the springs.
@@ -94,11 +99,7 @@ void ContactStages::book(double energy, int a, int b) {
 }
 
 static PolygonState now(const ContactPolygon& polygon, const Bodies& bodies, const Vec3& wall, int a, int b) {
-  const BodyArrays& arrays = bodies.arrays();
-  const auto frame = [&](int i) {
-    return frame_of(bodies.record(i), arrays.scale[i], arrays.shapes[arrays.shape[i]]);
-  };
-  return evaluate(polygon, a < 0 ? plane_frame(wall) : frame(a), frame(b));
+  return evaluate(polygon, placed(bodies, wall, a), placed(bodies, wall, b));
 }
 
 PolygonState ContactStages::polygon_state(const ContactPolygon& polygon, int b, const Vec3& wall,
