@@ -90,22 +90,16 @@ class CoreDistance {
   int i_ = 0, j_ = 0;
 };
 
-// Forgets an earlier solve of this kind: the other rungs know nothing of it.
-bool give_up(PairMemory* memory) {
-  if (memory->model.unique == kCorePair) drop_model(&memory->model);
-  return false;
-}
-
 }  // namespace
 
 bool solve_cores(const PairFrame& pair, double tolerance, const Particle& a, const Particle& b,
                  const ContactSettings& settings, PairMemory& memory, ContactResult* r) {
   if (!PairFrame::is_swept(*pair.a, pair.scale_a, tolerance) ||
       !PairFrame::is_swept(*pair.b, pair.scale_b, tolerance))
-    return give_up(&memory);
+    return give_up(kCorePair, &memory);
   const double radius_a = pair.scale_a * pair.a->core.radius, radius_b = pair.scale_b * pair.b->core.radius,
                radii = radius_a + radius_b;
-  if (!(radii > 0)) return give_up(&memory);
+  if (!(radii > 0)) return give_up(kCorePair, &memory);
   const double roundoff = kRoundoff * (pair.reach + pair.offset.lpNorm<1>()),
                slack = pair.scale_a * pair.a->core.error + pair.scale_b * pair.b->core.error + roundoff,
                least = kClosed * roundoff / settings.tolerance;
@@ -113,15 +107,15 @@ bool solve_cores(const PairFrame& pair, double tolerance, const Particle& a, con
   cores.start(memory.model);
   bool apart = false;
   for (r->iterations = 1;; ++r->iterations) {
-    if (r->iterations > kMostSteps || !cores.step(least)) return give_up(&memory);
+    if (r->iterations > kMostSteps || !cores.step(least)) return give_up(kCorePair, &memory);
     const double open = cores.upper - cores.lower, beyond = cores.lower - radii - slack - settings.reach;
     apart = beyond > 0 && open <= kApartShare * beyond;
     if (apart || open <= kClosed * roundoff) break;
     if (cores.grow()) continue;
-    if (!(open <= kOpen * roundoff)) return give_up(&memory);
+    if (!(open <= kOpen * roundoff)) return give_up(kCorePair, &memory);
     break;
   }
-  if (!apart && !(cores.upper - cores.lower + 2 * slack <= tolerance)) return give_up(&memory);
+  if (!apart && !(cores.upper - cores.lower + 2 * slack <= tolerance)) return give_up(kCorePair, &memory);
 
   r->rung = Rung::local_model;
   r->normal = pair.axes_a * cores.direction;

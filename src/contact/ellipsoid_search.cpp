@@ -148,24 +148,18 @@ bool set_result(const Solution& s, double slack, double allowed, double reach, C
   return r->status == Status::separated || r->upper - r->lower <= allowed;
 }
 
-// Forgets an earlier solve of this kind: the other rungs know nothing of it.
-bool give_up(PairMemory* memory) {
-  if (memory->model.unique == kEllipsoidPair) drop_model(&memory->model);
-  return false;
-}
-
 }  // namespace
 
 bool solve_ellipsoids(const Particle& a, const Particle& b, const ContactSettings& settings,
                       PairMemory& memory, ContactResult* r) {
   const Ellipsoid &ea = a.shape->ellipsoid, &eb = b.shape->ellipsoid;
-  if (!ea.found || !eb.found) return give_up(&memory);
+  if (!ea.found || !eb.found) return give_up(kEllipsoidPair, &memory);
   const double ra = a.scale * a.shape->bounding_radius, rb = b.scale * b.shape->bounding_radius;
   const double size = std::min(ra, rb);
   const double allowed = std::max(settings.tolerance * size, kLeastTolerance * std::max(ra, rb));
   EllipsoidPair pair{};
   pair.error = ea.error + eb.error;
-  if (pair.error * (ra + rb) > kEllipsoidError * allowed) return give_up(&memory);
+  if (pair.error * (ra + rb) > kEllipsoidError * allowed) return give_up(kEllipsoidPair, &memory);
   Problem q;
   q.a = put(a, pair.root_a, pair.least2_a);
   q.b = put(b, pair.root_b, pair.least2_b);
@@ -179,7 +173,7 @@ bool solve_ellipsoids(const Particle& a, const Particle& b, const ContactSetting
   ContactResult found;
   if (!(solve(q, memory, &s) || descend_deep(q, a, b, allowed, &s)) ||
       !set_result(s, pair.error * (ra + rb) + q.noise, allowed, settings.reach, &found))
-    return give_up(&memory);
+    return give_up(kEllipsoidPair, &memory);
   *r = found;
   remember(s, found, pair, offset, a.q, b.q, &memory);
   return true;
@@ -188,12 +182,12 @@ bool solve_ellipsoids(const Particle& a, const Particle& b, const ContactSetting
 bool solve_ellipsoid_on_plane(const Particle& particle, double height, const Vec3& normal,
                               const ContactSettings& settings, PairMemory& memory, ContactResult* r) {
   const Ellipsoid& e = particle.shape->ellipsoid;
-  if (!e.found) return give_up(&memory);
+  if (!e.found) return give_up(kEllipsoidPair, &memory);
   const double radius = particle.scale * particle.shape->bounding_radius;
   EllipsoidPair pair{};
   pair.error = e.error;
   const double noise = kRoundoff * (std::abs(height) + radius), slack = pair.error * radius + noise;
-  if (!(2 * slack <= settings.tolerance * radius)) return give_up(&memory);
+  if (!(2 * slack <= settings.tolerance * radius)) return give_up(kEllipsoidPair, &memory);
   const Placed plane{}, body = put(particle, pair.root_b, pair.least2_b);
   Solution s;
   s.d = triple(normal);

@@ -44,6 +44,13 @@ inline bool is_mark(double unique) {
   return unique < 0 && std::isfinite(unique);
 }
 
+// Forgets what a closed form left in a model's place under that mark, which the other rungs know nothing of;
+// false.
+inline bool give_up(double mark, PairMemory* m) {
+  if (m->model.unique == mark) drop_model(&m->model);
+  return false;
+}
+
 // What is remembered of other bodies, other sizes or by another solver is worth nothing: dropped whole.
 inline void adopt(std::uint64_t stamp, PairMemory* m) {
   if (m->proof.stamp == stamp) return;
