@@ -430,15 +430,14 @@ void ContactStages::settle_left(ContactBlock& block, int lane, Results& results,
   const bool touching = results.touching[lane] != 0;
   const double full = 0.5 * kn * results.gap[lane] * results.gap[lane];
   double held = left.normal_energy;
-  const bool takes_over = touching && (held > 0 || a < -1);
-  if (takes_over) {
+  if (touching) {
     const ContactGeometry g = results.geometry(lane);
     held += kn * arrived((full - held) / kn, a, b, g.normal, g.arm_a, g.arm_b);
   }
   double &weight = block.field[kWeight][lane], &shift = block.field[kShift][lane];
-  weight = takes_over ? std::clamp(held / full, a < -1 ? kSoftest : 1, kStiffest) : 1;
+  weight = touching ? std::clamp(held / full, a < -1 ? kSoftest : 1, kStiffest) : 1;
   shift = results.shift[lane] =
-      takes_over && weight > held / full && a >= -1 ? -results.gap[lane] - std::sqrt(2 * held / kn) : 0;
+      touching && weight > held / full && a >= -1 ? -results.gap[lane] - std::sqrt(2 * held / kn) : 0;
   if (step_.model != nullptr) return;
   double energy = held + left.tangential_energy;
   ContactState single{};
