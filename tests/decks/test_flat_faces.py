@@ -318,12 +318,18 @@ class RoundedEdges(unittest.TestCase):
     """Faces that lean until the rounded edge beside them bears. A contact that took over from a polygon was once as
     much softer as its overlap was larger, to a thousandth and less, and stayed so: bodies sank into each other."""
 
+    def simulate(self, text, files=None, ranks=1):
+        shape = deck.shape_file("rounded-box", 1, 1, 0.3, rounding=0.1)
+        return deck.run_ok(text, files={"body.json": shape, **(files or {})}, ranks=ranks)
+
     def deepest(self, files, **words):
-        out = deck.run_ok(ROUNDED.format(**words), files={"body.json": deck.shape_file("rounded-box", 1, 1, 0.3, rounding=0.1), **files})
+        out = self.simulate(ROUNDED.format(**words), files)
         depth = out.thermo["deepest"]
         return -depth[np.abs(depth) < 1e9].min(), out.thermo["KinEng"]
 
-    def test_bodies_that_bounce_on_others_stay_stiff(self):
+    @staticmethod
+    def pairs():
+        """64 bodies that are held, and one that falls on each."""
         random = np.random.default_rng(11)
         turns = random.normal(size=(128, 4))
         turns /= np.linalg.norm(turns, axis=1)[:, None]
@@ -334,10 +340,22 @@ class RoundedEdges(unittest.TestCase):
             atoms += [(k + 1, 1, 1, 0.07, DENSITY, x, y, 0.0, *turns[k])]
             atoms += [(k + 65, 1, 1, 0.1, DENSITY, x + places[k, 0], y + places[k, 1], 0.24, *turns[k + 64])]
             velocities += [(k + 1, *[0] * 6), (k + 65, 0, 0, -0.5, *spins[k])]
-        bodies = deck.data_file(atoms, velocities, ((-1, 4), (-1, 4), (-3, 1)))
-        depth, _ = self.deepest({"bodies.data": bodies}, bodies="read_data bodies.data", young="5e7", walls=HELD, steps=1500)
+        return {"bodies.data": deck.data_file(atoms, velocities, ((-1, 4), (-1, 4), (-3, 1)))}
+
+    def test_bodies_that_bounce_on_others_stay_stiff(self):
+        depth, _ = self.deepest(self.pairs(), bodies="read_data bodies.data", young="5e7", walls=HELD, steps=1500)
         print(f"    deepest overlap {depth:.4f} m of bodies 0.06 and 0.04 m thick", flush=True)
         self.assertLess(depth, 0.022)  # once 0.034
+
+    def test_the_same_bits_on_two_ranks(self):
+        text = ROUNDED.format(bodies="read_data bodies.data", young="5e7", walls=HELD, steps=700)
+        dump = "dump d all custom 700 out.dump id x y z vx omegaz\n"
+        dump += 'dump_modify d sort id format "%d %.17g %.17g %.17g %.17g %.17g"\nrun 700'
+        text = text.replace("run 700", dump)
+        one = self.simulate(text + "\nrun 700\n", self.pairs()).dump("out.dump")[-1][1]
+        two = self.simulate(text + "\nrun 700\n", self.pairs(), ranks=2).dump("out.dump")[-1][1]
+        for column in ("x", "y", "z", "vx", "omegaz"):
+            np.testing.assert_array_equal(one[column], two[column])
 
     def test_a_bed_bears_itself(self):
         depth, kinetic = self.deepest({}, bodies=LATTICE, young="1e8", walls=BED, steps=8000)
@@ -352,7 +370,7 @@ class RoundedEdges(unittest.TestCase):
         text = text.replace(" type 1 model hertz tangential history", " " + law).replace(" model hertz tangential history", "")
         text = text.replace("pair_coeff * *", "pair_coeff * * " + law).replace("timestep 1e-4", "timestep 5e-5")
         text = text.replace("thermo_style custom step ke", "compute led all nurbs/energy\nthermo_style custom step atoms c_led[3]")
-        out = deck.run_ok(text, files={"body.json": deck.shape_file("rounded-box", 1, 1, 0.3, rounding=0.1)})
+        out = self.simulate(text)
         self.assertEqual(out.thermo["Atoms"].min(), 81)
         damping = out.thermo["led[3]"]
         print(f"    undamped bed: {damping.min():.2g} to {damping.max():.2g} J of 5000 dissipated", flush=True)
