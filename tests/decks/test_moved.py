@@ -147,10 +147,11 @@ run 4000
         text += empty + 2 * ("run 1\n" + empty)
         r = deck.run_ok(text, files={"capsule.json": deck.ROOT / "examples/shapes/capsule.json"})
         self.assertGreater(r.tables[0]["st[8]"][-1], 50)
-        # Where a contact's effective radius has just followed the curvature by a stride (model_stage.cpp), the energy is off by that.
+        # Where a contact's effective radius has just followed the curvature by a stride (model_stage.cpp), the energy is off by that: at one
+        # of three steps, by chance.
         off = [abs(r.tables[k + 1]["led[1]"][-1] / r.tables[k]["led[1]"][-1] - 1) for k in (0, 4, 8)]
-        self.assertLess(min(off), 1e-9)
-        self.assertLess(max(off), 1e-5)
+        self.assertLess(sorted(off)[1], 1e-9)
+        self.assertLess(max(off), 1e-3)
         for k in (1, 5, 9):
             for name in ("led[1]", "led[2]", "w0[3]", "st[8]"):
                 self.assertEqual(r.tables[k][name][-1], r.tables[k + 2][name][-1], name)
