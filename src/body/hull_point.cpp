@@ -55,8 +55,8 @@ HullPoint HullPoints::on_ellipsoid(const Vec3& d) const {
 }
 
 HullPoint HullPoints::of_points(const Vec3& d) const {
-  const Vec3 point = shape_.core.points[shape_.core.support(d)] + shape_.core.radius * d;
-  return {point, d, d.dot(point) + error_ + kRoundoff * shape_.bounding_radius, {}};
+  const Support s = core_support(shape_, d);
+  return {s.point, d, s.upper, {}};
 }
 
 bool HullPoints::on_meridian(const Vec3& d, const HullPlace* start, HullPoint* found) const {

@@ -30,6 +30,12 @@ BodyFrame placed(const Bodies& bodies, const Vec3& wall, int i) {
   return frame_of(bodies.record(i), arrays.scale[i], arrays.shapes[arrays.shape[i]]);
 }
 
+// Takes a part off a shift.
+void come_closer(double part, double radius, double* shift) {
+  *shift *= 1 - part;
+  if (*shift < kNoShift * radius) *shift = 0;
+}
+
 void fill(const ContactPolygon& polygon, const PolygonState& state, const Vec3& offset, ContactBlock* points,
           ContactStages::Results* results) {
   double together = 0;
@@ -286,8 +292,7 @@ void ContactStages::relax_polygon(const ContactBlock& block, int lane, FlatConta
   double energy = 0;
   if (flat.polygon.shift != 0) {
     energy -= law.kn * stored_energy(flat.polygon, *state);
-    flat.polygon.shift *= 1 - kRelaxation * rest.phase;
-    if (flat.polygon.shift < kNoShift * record(block.b[lane]).radius) flat.polygon.shift = 0;
+    come_closer(kRelaxation * rest.phase, record(block.b[lane]).radius, &flat.polygon.shift);
     *state = now(flat.polygon, *step_.bodies, wall_frame(block.a[lane]), block.a[lane], block.b[lane]);
     energy += law.kn * stored_energy(flat.polygon, *state);
   }
@@ -486,8 +491,7 @@ void ContactStages::relax_single(ContactBlock& block, int lane, Results& results
   if (!rest.rests || (weight < 1 && step_.model != nullptr)) return;
   const double part = kRelaxation * rest.phase, change = part * (1 - weight);
   const double before = results.geometry(lane).overlap;
-  shift *= 1 - part;
-  if (shift < kNoShift * record(b).radius) shift = 0;
+  come_closer(part, record(b).radius, &shift);
   results.shift[lane] = shift;
   const double after = results.geometry(lane).overlap;
   weight += change;

@@ -12,20 +12,16 @@
 #include "contact/pair_search.h"
 #include "shapes/primitives.h"
 #include "shapes/revolved.h"
-#include "shapes/rounded_polyhedron.h"
-#include "support/as_surface.h"
 #include "support/bodies.h"
+#include "support/flat_bodies.h"
 #include "support/random.h"
 
 namespace nurbs::test_core_search {
 namespace {
 
 using test::Random;
+using test::rounded_solid;
 using Body = std::shared_ptr<const Shape>;
-
-Body rounded(const std::string& solid, double radius) {
-  return make_shape(solid, rounded_polyhedron(platonic_solid(solid, 1), Vec3::Zero(), radius));
-}
 
 std::vector<Body> swept_bodies() {
   return {make_shape("capsule", capsule(0.3, 2)),
@@ -34,9 +30,13 @@ std::vector<Body> swept_bodies() {
           make_shape("die", rounded_box({1, 0.8, 0.6}, 0.2)),
           make_shape("plate", rounded_box({1, 0.7, 0.05}, 0.05)),
           make_shape("sharp", rounded_box({1, 0.8, 0.6}, 0.01)),
-          rounded("tetrahedron", 0.15),
-          rounded("octahedron", 0.1),
-          rounded("icosahedron", 0.3)};
+          rounded_solid("tetrahedron", 0.15),
+          rounded_solid("octahedron", 0.1),
+          rounded_solid("icosahedron", 0.3)};
+}
+
+const Shape& any_of(const std::vector<Body>& bodies, Random& random) {
+  return *bodies[random.below(static_cast<int>(bodies.size()))];
 }
 
 // Corners of the core where the body is.
@@ -127,8 +127,7 @@ TEST(CoreSearch, against_all_features_of_the_cores) {
   Random random(771);
   int solved = 0, apart = 0;
   for (int k = 0; k < 6000; ++k) {
-    const Shape &sa = *bodies[random.below(static_cast<int>(bodies.size()))],
-                &sb = *bodies[random.below(static_cast<int>(bodies.size()))];
+    const Shape &sa = any_of(bodies, random), &sb = any_of(bodies, random);
     Particle a, b;
     place(random, sa, sb, 1 + (k % 2 ? -1 : 1) * random.log_uniform(1e-6, 0.9), k % 3 == 0, &a, &b);
     if (k % 5 == 0)
@@ -179,7 +178,7 @@ TEST(CoreSearch, cores_that_meet_are_left_to_the_other_rungs) {
   const std::vector<Body> bodies = swept_bodies();
   Random random(772);
   for (int k = 0; k < 300; ++k) {
-    const Shape &sa = *bodies[random.below(static_cast<int>(bodies.size()))],
+    const Shape &sa = any_of(bodies, random),
                 &sb = *bodies[3 + random.below(static_cast<int>(bodies.size()) - 3)];
     Particle a, b;
     place(random, sa, sb, -random.uniform(0.01, 0.5), false, &a, &b);
@@ -204,8 +203,7 @@ TEST(CoreSearch, goes_on_from_the_last_corners) {
   Random random(773);
   int steps = 0, iterations = 0;
   for (int k = 0; k < 200; ++k) {
-    const Shape &sa = *bodies[random.below(static_cast<int>(bodies.size()))],
-                &sb = *bodies[random.below(static_cast<int>(bodies.size()))];
+    const Shape &sa = any_of(bodies, random), &sb = any_of(bodies, random);
     Particle a, b;
     place(random, sa, sb, random.uniform(0.5, 0.9), k % 2 == 0, &a, &b);
     double memory[kPairMemorySize] = {};

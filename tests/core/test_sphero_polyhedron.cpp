@@ -11,9 +11,9 @@
 #include "io/pair_case.h"
 #include "shapes/primitives.h"
 #include "shapes/revolved.h"
-#include "shapes/rounded_polyhedron.h"
 #include "support/bodies.h"
 #include "support/cases.h"
+#include "support/flat_bodies.h"
 #include "support/least_overlap.h"
 #include "support/pairs.h"
 #include "support/random.h"
@@ -22,11 +22,8 @@ namespace nurbs::test_sphero_polyhedron {
 namespace {
 
 using test::Random;
+using test::rounded_solid;
 using Body = std::shared_ptr<const Shape>;
-
-Body rounded(const std::string& solid, double radius) {
-  return make_shape(solid, rounded_polyhedron(platonic_solid(solid, 1), Vec3::Zero(), radius));
-}
 
 void expect_supports(const Shape& shape, size_t points, double radius) {
   const SpheroPolyhedron& core = shape.core;
@@ -45,9 +42,9 @@ TEST(SpheroPolyhedron, of_bodies_that_are_some) {
   expect_supports(*make_shape("rounded-box", rounded_box({1, 0.7, 0.4}, 0.1)), 8, 0.1);
   expect_supports(*make_shape("plate", rounded_box({1, 1, 0.01}, 0.002)), 8, 0.002);
   expect_supports(*make_shape("box", box({1, 0.7, 0.4})), 8, 0);
-  expect_supports(*rounded("tetrahedron", 0.1), 4, 0.1);
-  expect_supports(*rounded("dodecahedron", 0.05), 20, 0.05);
-  expect_supports(*rounded("icosahedron", 1e-4), 12, 1e-4);
+  expect_supports(*rounded_solid("tetrahedron", 0.1), 4, 0.1);
+  expect_supports(*rounded_solid("dodecahedron", 0.05), 20, 0.05);
+  expect_supports(*rounded_solid("icosahedron", 1e-4), 12, 1e-4);
 }
 
 TEST(SpheroPolyhedron, of_no_others) {
@@ -178,9 +175,9 @@ TEST(BallHull, of_tapered_capsules) {
   for (const Vec3& d : test::spiral(2000))
     EXPECT_NEAR(find_hull_support(*body, d).h, std::max(1.0, 0.5 + 1.5 * d[2]) - d.dot(body->mass.center),
                 1e-12);
-  for (const Body& other :
-       {make_shape("egg", egg(1, 0.9, 0.5)), make_shape("tablet", tablet(1, 1, 0.2)),
-        make_shape("capsule", capsule(0.5, 2)), make_shape("pebble", pebble()), rounded("tetrahedron", 0.1)})
+  for (const Body& other : {make_shape("egg", egg(1, 0.9, 0.5)), make_shape("tablet", tablet(1, 1, 0.2)),
+                            make_shape("capsule", capsule(0.5, 2)), make_shape("pebble", pebble()),
+                            rounded_solid("tetrahedron", 0.1)})
     EXPECT_TRUE(other->ball_hull.centres.empty()) << other->name;
 }
 
@@ -224,7 +221,7 @@ TEST(BallHull, contacts_of_two_are_least_overlaps) {
                                     tapered(0.7, 0, 2),
                                     make_shape("capsule", capsule(0.5, 2)),
                                     make_shape("ball", exact_ellipsoid({0.7, 0.7, 0.7})),
-                                    rounded("tetrahedron", 0.1)};
+                                    rounded_solid("tetrahedron", 0.1)};
   for (int k = 0; k < 240; ++k) {
     const Shape &sa = *bodies[random.below(4)], &sb = k % 8 == 1 ? sa : *bodies[random.below(7)];
     Particle a{&sa, 1, Vec3::Zero(), random.turn()},

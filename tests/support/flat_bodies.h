@@ -3,14 +3,21 @@
 
 #include <cmath>
 #include <memory>
+#include <string>
 #include <utility>
 #include <vector>
 
 #include "body/shape.h"
 #include "shapes/primitives.h"
 #include "shapes/revolved.h"
+#include "shapes/rounded_polyhedron.h"
 
 namespace nurbs::test {
+
+// A Platonic solid with corners 1 from its centre, and edges rounded by balls.
+inline std::shared_ptr<const Shape> rounded_solid(const std::string& solid, double rounding) {
+  return make_shape(solid, rounded_polyhedron(platonic_solid(solid, 1), Vec3::Zero(), rounding));
+}
 
 inline std::vector<NurbsSurface> cylinder(double radius, double half_height) {
   return {surface_of_revolution(

@@ -184,25 +184,25 @@ PolygonState give_energy(double energy, double stiffest, const BodyFrame& a, con
   constexpr double kSameEnergy = 1e-13;
   const double most = std::max(stiffest, polygon->factor), kept = polygon->shift;
   polygon->shift = 0;
-  PolygonState state = evaluate(*polygon, a, b);
+  const PolygonState whole = evaluate(*polygon, a, b);
   if (!(energy > 0)) {
-    polygon->shift = std::max(0.0, -state.least);
+    polygon->shift = std::max(0.0, -whole.least);
     return evaluate(*polygon, a, b);
   }
-  if (!(state.energy > 0)) return state;
-  polygon->factor = std::clamp(energy / state.energy, 1.0, most);
-  polygon->shift = energy < state.energy ? std::clamp(kept, 0.0, -state.least) : 0;
-  for (int k = 0; k < kSteps && energy < state.energy; ++k) {
-    const PolygonState now = evaluate(*polygon, a, b);
+  if (!(whole.energy > 0)) return whole;
+  polygon->factor = std::clamp(energy / whole.energy, 1.0, most);
+  if (energy >= whole.energy) return whole;
+  polygon->shift = std::clamp(kept, 0.0, -whole.least);
+  PolygonState state = evaluate(*polygon, a, b);
+  for (int k = 0; k < kSteps && std::abs(state.energy - energy) > kSameEnergy * energy; ++k) {
     double force = 0;
-    for (int i = 0; i < now.count; ++i) force += polygon->weight[i] * std::max(0.0, -now.gap[i]);
-    const double more = now.energy - energy;
-    if (std::abs(more) <= kSameEnergy * energy) return now;
-    const double root = std::sqrt(now.energy);
+    for (int i = 0; i < state.count; ++i) force += polygon->weight[i] * std::max(0.0, -state.gap[i]);
+    const double root = std::sqrt(state.energy);
     polygon->shift = force > 0 ? std::max(0.0, polygon->shift + 2 * root * (root - std::sqrt(energy)) / force)
                                : 0.5 * polygon->shift;
+    state = evaluate(*polygon, a, b);
   }
-  return evaluate(*polygon, a, b);
+  return state;
 }
 
 double relax(ContactPolygon& polygon, const PolygonState& state, double share) {
