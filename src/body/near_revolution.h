@@ -24,8 +24,8 @@ void archive(Archive& a, NearRevolution& s) {
   a(revolution, meridian, radii);
 }
 
-// Of a body whose joints meet and that is none of revolution itself; off that by no more than kNearRevolution
-// of its size.
+// Of a body whose joints meet and that is none of revolution itself, or only to more than round-off; off that
+// by no more than kNearRevolution of its size.
 NearRevolution find_near_revolution(const std::vector<BezierPatch>& patches, const Mat3& inertia,
                                     double size);
 

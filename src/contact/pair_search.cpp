@@ -397,7 +397,7 @@ class Ladder {
       if (hull.inside) find_points_again(pair, tolerance, &hull);
       locate(pair, &hull.points);
     }
-    hull.converged = hull.bracket.width() <= tolerance;
+    hull.converged = hull.converged || hull.bracket.width() <= tolerance;
     return finish(pair, hull, hull.bracket.direction, Rung::fallback, spent);
   }
 

@@ -120,6 +120,7 @@ constexpr double kEllipsoid =
 
 // --- bodies of revolution
 constexpr double kArcError = 1e-10;       // of the body's size: what arcs about the axis may be off by ...
+constexpr double kExactTurn = 1e-14;      // ... where that is more than round-off ...
 constexpr double kNearRevolution = 1e-4;  // ... and of rippled bodies, from files of few digits,
 constexpr double kNearKink = 1e-4;        // rad: whose profiles' pieces are in line up to that
 

@@ -7,6 +7,8 @@ namespace nurbs {
 namespace {
 
 constexpr double kAllRings = 1.25;  // of what one search may spend, all axes together
+constexpr double kLeastWidth =
+    30 * kRoundoff;  // of the larger radius, of a bracket: what turns a body out of itself is part of it
 
 // About the axis of K's revolution or, if not null, of these arcs.
 bool search_about(const PairFrame& pair, bool k_is_a, const RoundEdges* arcs, double tolerance, bool last,
@@ -29,6 +31,7 @@ bool search_about(const PairFrame& pair, bool k_is_a, const RoundEdges* arcs, do
 }  // namespace
 
 bool search_rings(const PairFrame& pair, double tolerance, bool last, PolytopeResult* result) {
+  tolerance = std::max(tolerance, kLeastWidth * pair.reach);
   double left = kAllRings;
   for (const bool k_is_a : {true, false}) {
     const Shape& k = k_is_a ? *pair.a : *pair.b;

@@ -8,7 +8,8 @@ namespace nurbs {
 
 // Improves `result`, the polytope's answer for overlapping bodies of which A or B is one of revolution about
 // an axis or has edges that are: bracket and, where it closes, points and normal. True when the bracket is
-// closed. `last`: the polytope did not close it; rings may be less alike then.
+// closed, to `tolerance` or what round-off leaves of it. `last`: the polytope did not close it; rings may be
+// less alike then.
 //
 // With e = d (or -d, for B) at azimuth phi and angle alpha from the axis of K, the body of revolution,
 // p >= r_K |e - (e.a) a| + z_K e.a - e.(o + x) for every circle (r_K, z_K) of K about its axis a and point x

@@ -4,6 +4,15 @@ namespace nurbs {
 namespace {
 
 constexpr double kCore = 1 - 1e-12;  // of the largest ball that rolls inside the mate
+constexpr double kErrorShare = 0.2;  // of the tolerance, that what turns a body out of itself may take
+
+// What a body nearly is, where it is none of revolution to enough of the tolerance; else null.
+const NearRevolution* near_revolution(const Shape& shape, double scale, double tolerance) {
+  const double error = shape.revolution.error + shape.meridian.error;
+  if (shape.revolution.found && (scale * error <= kErrorShare * tolerance || !shape.near_revolution.found()))
+    return nullptr;
+  return &shape.near_revolution;
+}
 
 }  // namespace
 
@@ -17,9 +26,10 @@ RingView::RingView(const PairFrame& pair, bool k_is_a, bool core, double toleran
   turn_k = k_is_a ? Mat3(Mat3::Identity()) : pair.turn;
   turn_m = k_is_a ? pair.turn : Mat3(Mat3::Identity());
   offset = sign * pair.offset;
-  if (!arcs && !k->revolution.found) near_k = &k->near_revolution;
-  axis = (turn_k * (arcs ? arcs->axis : revolution_of(*k).axis)).normalized();
-  point = scale_k * (turn_k * (arcs ? arcs->point : revolution_of(*k).point));
+  if (!arcs) near_k = near_revolution(*k, scale_k, tolerance);
+  const Revolution& own = near_k ? near_k->revolution : k->revolution;
+  axis = (turn_k * (arcs ? arcs->axis : own.axis)).normalized();
+  point = scale_k * (turn_k * (arcs ? arcs->point : own.point));
   if (near_k) add_ripple(*near_k, scale_k);
   if (m->proofs.sphere) {  // any axis is its own
     mate_axis = axis;
@@ -28,7 +38,8 @@ RingView::RingView(const PairFrame& pair, bool k_is_a, bool core, double toleran
     mate_error = m->bounding_radius - m->inner_radius;
     return;
   }
-  const Revolution& mate = revolution_of(*m);
+  const NearRevolution* near = near_revolution(*m, scale_m, tolerance);
+  const Revolution& mate = near ? near->revolution : m->revolution;
   mate_axis = (turn_m * mate.axis).normalized();
   if (mate_axis.dot(axis) < 0) {
     mate_axis = -mate_axis;
@@ -39,8 +50,8 @@ RingView::RingView(const PairFrame& pair, bool k_is_a, bool core, double toleran
   const double sine = axis.cross(mate_axis).norm();
   circles = mate.found && sine < kNearAxis;
   if (circles) tilt = sine;
-  if (circles && !m->revolution.found) {
-    near_m = &m->near_revolution;
+  if (circles && near) {
+    near_m = near;
     add_ripple(*near_m, scale_m);
     mate_error = 0;
   }
