@@ -460,11 +460,13 @@ double outside(const Particle& p, const Vec3& point) {
 }
 
 // The gap was right and the points were off their bodies, by up to half the radius: of a hull that had given
-// directions away about its minimum; of rings that knew two points where it took three; of a last Newton step
-// along ruled lines, beyond their ends or too far for second order.
+// directions away about its minimum, or closed with its first points; of rings that knew two points where it
+// took three; of a last Newton step along ruled lines, beyond their ends or too far for second order.
 TEST(SavedCases, contact_points_lie_on_the_bodies) {
-  for (const char* file : {"bullet-twins.json", "pillow-in-paraboloid-cap.json",
-                           "cylinders-side-by-side.json", "pillow-twins.json", "double-cone-twins.json"}) {
+  for (const char* file :
+       {"bullet-twins.json", "pillow-in-paraboloid-cap.json", "cylinders-side-by-side.json",
+        "pillow-twins.json", "double-cone-twins.json", "cylinder-edge-on-profile.json",
+        "stacked-cylinders.json", "double-cones-side-by-side.json", "capsule-along-profile.json"}) {
     const PairCase pair = read_pair_case(std::string("tests/cases/") + file);
     pair.a.shape->inner_map();
     pair.b.shape->inner_map();

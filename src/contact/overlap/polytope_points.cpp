@@ -97,12 +97,15 @@ Vec3 PolytopeSearch::target() const {
 // Points of the bodies that are as nearly so as the supports along direction_ or one of the hull's
 // triangles has them. About a minimum whose cap is proven the hull stays coarse, and what is given away
 // there belongs to neither body: where the supports do not face each other, as on ruled lines, it is made
-// again without.
+// again without; and a hull that closed with its first points, on faces, is made finer.
 void PolytopeSearch::find_witness(Vec3* a, Vec3* b) {
-  if (find_nearest_pair(a, b).off <= kFacing * pair_.size || caps_ == 0) return;
-  drop_caps();
-  Vec3 across;
-  if (start_from_points(0, &across)) refine_pair(a, b);
+  if (find_nearest_pair(a, b).off <= kFacing * pair_.size) return;
+  if (caps_ > 0) {
+    drop_caps();
+    Vec3 across;
+    if (!start_from_points(0, &across)) return;
+  }
+  refine_pair(a, b);
 }
 
 void PolytopeSearch::refine_pair(Vec3* a, Vec3* b) {
