@@ -529,7 +529,7 @@ void FixWallNurbs::post_force(int) {
     if (neighbor->ago == 0) hand_in_neighbours();
     Vec3Map{wall_.x} = origin_;
     for (int k = 0; k < 9; k += 4) wall_.turn[k] = 1;
-    wall_.radius = nurbs::kFarAway;
+    wall_.radius = wall_.inner = nurbs::kFarAway;
     step.wall = &wall_;
     step.wall_normal = normal_;
     stages_.compute(step);

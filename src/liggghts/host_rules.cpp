@@ -147,12 +147,17 @@ void check_insertion(LAMMPS* lmp, Fix* fix) {
   }
 }
 
-// Properties of pairs of types that the host takes at any value; below 0 a contact would drive what it is to
-// brake.
+// Properties that the host takes at any value: below 0 a contact would pull, or drive what it is to brake.
 void check_materials(LAMMPS* lmp, Fix* fix) {
   auto* property = dynamic_cast<FixPropertyGlobal*>(fix);
   if (property == nullptr) return;
   const int types = lmp->atom->ntypes;
+  if (property->check_fix("youngsModulus", "peratomtype", types, 0, "atom_style nurbs", false) != nullptr)
+    for (int i = 0; i < types; ++i)
+      if (const double value = property->compute_vector(i); !(value > 0))
+        fail_all(FLERR, lmp,
+                 name_of(*fix) + ": youngsModulus of type " + std::to_string(i + 1) + " = " + show(value) +
+                     " must be > 0");
   for (const char* name : {"coefficientFriction", "coefficientRollingFriction",
                            "coefficientRollingViscousDamping", "kn", "kt", "gamman", "gammat"}) {
     if (property->check_fix(name, "peratomtypepair", types, types, "atom_style nurbs", false) == nullptr)

@@ -50,6 +50,7 @@ nurbs::DeepContacts of_all_ranks(LAMMPS* lmp, const nurbs::DeepContacts& mine) {
   nurbs::DeepContacts all;
   MPI_Allreduce(&mine.count, &all.count, 1, MPI_DOUBLE, MPI_SUM, lmp->world);
   MPI_Allreduce(&mine.deepest, &all.deepest, 1, MPI_DOUBLE, MPI_MAX, lmp->world);
+  MPI_Allreduce(&mine.through, &all.through, 1, MPI_DOUBLE, MPI_MAX, lmp->world);
   return all;
 }
 
@@ -135,15 +136,25 @@ void warn_deep(LAMMPS* lmp, const nurbs::DeepContacts& mine, const std::string& 
 
 void warn_deep_run(LAMMPS* lmp, const nurbs::DeepContacts& mine, const std::string& user) {
   const nurbs::DeepContacts all = of_all_ranks(lmp, mine);
-  if (all.count == 0) return;
+  static constexpr char kQuestion[] = "are they too soft, or is the time step too long?";
   char words[256];
-  std::snprintf(words, sizeof words,
-                "in the run contacts were as deep as %.3g %% of the bounding radius; beyond %g %% with flat "
-                "faces, %g %% without, they need not keep energy: are they too soft, or is "
-                "the time step too long?",
-                100 * all.deepest, 100 * nurbs::DeepContacts::kFlatInRun,
-                100 * nurbs::DeepContacts::kRoundInRun);
-  warn(FLERR, lmp, user + ": " + words);
+  if (all.count > 0) {
+    std::snprintf(
+        words, sizeof words,
+        "in the run contacts were as deep as %.3g %% of the bounding radius; beyond %g %% with flat "
+        "faces, %g %% without, they need not keep energy: %s",
+        100 * all.deepest, 100 * nurbs::DeepContacts::kFlatInRun, 100 * nurbs::DeepContacts::kRoundInRun,
+        kQuestion);
+    warn(FLERR, lmp, user + ": " + words);
+  }
+  if (all.through > 0) {
+    std::snprintf(
+        words, sizeof words,
+        "in the run bodies overlapped by as much as %.3g %% of what both are thick (the radii of balls "
+        "inside them); near 100 %% they go through each other: %s",
+        100 * all.through, kQuestion);
+    warn(FLERR, lmp, user + ": " + words);
+  }
 }
 
 bool wants_ledger(const LAMMPS* lmp) {

@@ -55,6 +55,7 @@ void Bodies::update(int i, double dt, bool renumbered) {
   store(p.q, known.q);
   store(p.x, r.x);
   r.radius = arrays_.radius[i];
+  r.inner = p.scale * shape.inner_radius;
   r.free = 1;
   r.flat = shape.flats.empty() ? 0 : 1;
   const Mat3 turn = p.q.toRotationMatrix();

@@ -45,10 +45,10 @@ struct BodyArrays {
 struct alignas(64) BodyRecord {
   double x[3];
   double turn[9];  // shape axes into lab axes, by rows
-  double radius;   // of the bounding sphere
+  double radius;   // of the bounding sphere; a wall's is kFarAway, as is `inner`
   double free;     // 1; 0 for a wall, whose contact normal is its own whatever touches it
   double flat;     // 1 if the body has flat features (body/flat_faces.h)
-  double spare;
+  double inner;    // radius of the largest ball inside about the centre of mass
   double velocity[3], spin[3], spin_before[3];  // see BodyMotion
   double inverse_mass, inverse_inertia[6];      // xx yy zz xy xz yz, lab
 };

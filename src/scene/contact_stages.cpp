@@ -309,7 +309,9 @@ void ContactStages::count(const ContactResult& r, int a, int b) {
 }
 
 void ContactStages::note_depth(int a, int b, double gap) {
-  const double radius = smaller_radius(a, b);
+  const double radius = smaller_radius(a, b), thick = record(a).inner + record(b).inner;
+  if (!step_.setup && -gap > DeepContacts::kThroughInRun * thick)
+    deep_in_run_.through = std::max(deep_in_run_.through, -gap / thick);
   if (!(-gap > DeepContacts::kDepth * radius)) return;
   const double depth = -gap / radius;
   const auto add = [&](DeepContacts& to) {

@@ -22,6 +22,8 @@
 
 namespace nurbs {
 
+struct ContactRest;  // scene/wall_energy.h
+
 // What came of the pairs in one step, in the order of compute nurbs/stats.
 struct ContactCounts {
   enum Index {
@@ -47,7 +49,11 @@ struct DeepContacts {
   static constexpr double kDepth = 0.1;  // of the smaller bounding radius
   // In a run, where bodies with flat faces have gained energy under Hertz's law, and for others.
   static constexpr double kFlatInRun = 0.15, kRoundInRun = 0.3;
-  double count = 0, deepest = 0;
+  // Of what the bodies are thick, the sum of the radii of balls inside both: from twice that on thin ones are
+  // pushed out on the other side.
+  static constexpr double kThroughInRun = 0.5;
+  double count = 0, deepest = 0;  // of the smaller bounding radius
+  double through = 0;             // deepest of what both are thick, beyond kThroughInRun
 };
 
 // Force and torque of one contact, as a host reports it.
@@ -249,9 +255,17 @@ class ContactStages {
   ModelMemory& model_memory(const ContactBlock& block, int lane) {
     return *reinterpret_cast<ModelMemory*>(pool_.memory(block, lane));
   }
-  double model_energy(const ContactBlock& block, int lane, const ContactGeometry& geometry);
-  ModelContact model_contact(const ContactBlock& block, int lane, const ContactGeometry& geometry,
-                             const ModelMemory& own) const;
+  using PointMemories = std::array<const double*, kContactPoints>;
+  PointMemories point_memories(const FlatContact& flat) const;
+  double model_energy(int a, int b, const double* memory, const SphereCurvatures& spheres,
+                      const ContactGeometry& geometry) const;
+  double model_energy(const ContactBlock& block, int lane, const ContactGeometry& geometry) const;
+  double model_energy(const ContactPolygon& polygon, const PolygonState& state, int a, int b,
+                      const double* const* memory) const;
+  PolygonState give_model(ContactPolygon* polygon, int a, int b, double energy,
+                          const double* const* memory) const;
+  ModelContact model_contact(int a, int b, const ContactGeometry& geometry, const ModelMemory& own) const;
+  SphereCurvatures point_spheres(int a, int b) const;  // of a polygon's points
   void forget_spheres(ContactBlock& block, int lane);  // of a body that is another now
   SphereCurvatures model_curvatures(const ContactBlock& block, int lane,
                                     const ContactGeometry& geometry) const;
@@ -336,12 +350,17 @@ class ContactStages {
   void forget_flat(ContactBlock& block, int lane);
   bool serve_flat(ContactBlock& block, int lane, LeftPolygon* left);
   bool remake(ContactBlock& block, int lane, FlatContact& flat, PolygonState& state, double overlap);
+  double kept_energy(const FlatContact& flat, const PolygonState& state, const ContactPolygon& polygon,
+                     const PolygonState& fresh, int a, int b, const double* const* memory,
+                     double holds) const;
   void run_flat(ContactBlock& block, int lane, FlatContact& flat, const PolygonState& state);
   LeftPolygon leave_flat(ContactBlock& block, int lane, FlatContact& flat, const PolygonState& state,
                          double overlap);
   void settle_left(ContactBlock& block, int lane, Results& results, const LeftPolygon& left);
-  double arrived(double more, int a, int b, const Vec3& normal, const Vec3& arm_a, const Vec3& arm_b) const;
-  void relax_polygon(const ContactBlock& block, int lane, FlatContact& flat, PolygonState* state);
+  double arrival(int a, int b, const Vec3& normal, const Vec3& arm_a, const Vec3& arm_b) const;
+  double energy_of(const FlatContact& flat, const PolygonState& state, int a, int b) const;
+  void relax_polygon(const ContactBlock& block, int lane, const ContactRest& rest, FlatContact& flat,
+                     PolygonState* state);
   PolygonState give(ContactPolygon* polygon, int a, int b, double energy) const;
   void stand_off(ContactBlock& block, int lane, Results& results);
   void relax_single(ContactBlock& block, int lane, Results& results);

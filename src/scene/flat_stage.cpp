@@ -167,11 +167,25 @@ bool ContactStages::make_flat(ContactBlock& block, int lane, const Results& sing
   }
   PolygonState state = now(polygon, *step_.bodies, wall_frame(a), a, b);
   if (!(state.energy > 0)) return false;
-  const double weight = block.field[kWeight][lane], felt = overlap - single.shift[lane];
-  if (a >= -1)
-    state = give(&polygon, a, b, 0.5 * weight * felt * felt);
-  else
-    polygon.factor = continuity_factor(0.5 * weight * felt * felt, polygon, state);
+  const double weight = block.field[kWeight][lane];
+  const ContactGeometry geometry = single.geometry(lane);
+  if (step_.model != nullptr) {
+    PointMemories memory;
+    memory.fill(pool_.memory(block, lane));
+    const double energy = weight * model_energy(block, lane, geometry);
+    if (a >= -1) {
+      state = give_model(&polygon, a, b, energy, memory.data());
+    } else {
+      const double full = model_energy(polygon, state, a, b, memory.data());
+      polygon.factor = energy > 0 && full > 0 ? energy / full : 1;
+    }
+  } else {
+    const double energy = 0.5 * weight * geometry.overlap * geometry.overlap;
+    if (a >= -1)
+      state = give(&polygon, a, b, energy);
+    else
+      polygon.factor = continuity_factor(energy, polygon, state);
+  }
   if (!(polygon.factor < kStiffest)) return false;
 
   ContactState old;
@@ -246,6 +260,9 @@ bool ContactStages::serve_flat(ContactBlock& block, int lane, LeftPolygon* left)
     forget_flat(block, lane);
     return false;
   }
+  // Of the points that bore in the last step, before others take their place.
+  const bool adjusted = flat.polygon.factor != 1 || flat.polygon.shift != 0;
+  const ContactRest rest = adjusted ? rest_of(flat, state.count, record(a), record(b)) : ContactRest{};
   const PolygonVerdict verdict = judge(flat.polygon, state);
   double& until = flat.points.until[0];
   const double way = clear_way(a, b, &until);
@@ -275,20 +292,17 @@ bool ContactStages::serve_flat(ContactBlock& block, int lane, LeftPolygon* left)
       return false;
     }
   }
-  if (!step_.setup && (flat.polygon.factor != 1 || flat.polygon.shift != 0))
-    relax_polygon(block, lane, flat, &state);
+  if (!step_.setup && rest.rests) relax_polygon(block, lane, rest, flat, &state);
   counts_.value[ContactCounts::local_model] += share(a, b);
   run_flat(block, lane, flat, state);
   return true;
 }
 
 // Towards the polygon's own stiffness and place; what the springs give up or get is booked.
-void ContactStages::relax_polygon(const ContactBlock& block, int lane, FlatContact& flat,
-                                  PolygonState* state) {
+void ContactStages::relax_polygon(const ContactBlock& block, int lane, const ContactRest& rest,
+                                  FlatContact& flat, PolygonState* state) {
   const ContactCoefficients law =
       coefficients(block, lane);  // zeros where a model serves, which books itself
-  const ContactRest rest = rest_of(flat, state->count, record(block.a[lane]), record(block.b[lane]));
-  if (!rest.rests) return;
   double energy = 0;
   if (flat.polygon.shift != 0) {
     energy -= law.kn * stored_energy(flat.polygon, *state);
@@ -308,14 +322,34 @@ void ContactStages::relax_polygon(const ContactBlock& block, int lane, FlatConta
   book(-energy, block.a[lane], block.b[lane]);
 }
 
-// Of what contacts hold more than those whose place they take (U / kn), what came to the surface in this
-// step: that no spring has held before, and it is none's share.
-double ContactStages::arrived(double more, int a, int b, const Vec3& normal, const Vec3& arm_a,
-                              const Vec3& arm_b) const {
+// What of an overlap may have come to the surface in this step: what that holds no spring has held before,
+// and it is none's share.
+double ContactStages::arrival(int a, int b, const Vec3& normal, const Vec3& arm_a, const Vec3& arm_b) const {
   const BodyRecord &ra = record(a), &rb = record(b);
   const Vec3 velocity = velocity_at(ra, rb, load(ra.spin), load(rb.spin), arm_a, arm_b);
-  const double way = kArrival * step_.dt * std::max(0.0, -normal.dot(velocity));
-  return std::clamp(0.5 * way * way, 0.0, std::max(0.0, more));
+  return kArrival * step_.dt * std::max(0.0, -normal.dot(velocity));
+}
+
+// Of a polygon's points: by the linear law U / kn, else the model's.
+double ContactStages::energy_of(const FlatContact& flat, const PolygonState& state, int a, int b) const {
+  return step_.model != nullptr ? model_energy(flat.polygon, state, a, b, point_memories(flat).data())
+                                : stored_energy(flat.polygon, state);
+}
+
+// The part of it that goes to `polygon`, whose points would hold `holds`, and have the history of the
+// memories: springs keep their energy. An old line that rolled has left the place where it bore.
+double ContactStages::kept_energy(const FlatContact& flat, const PolygonState& state,
+                                  const ContactPolygon& polygon, const PolygonState& fresh, int a, int b,
+                                  const double* const* memory, double holds) const {
+  const bool rolled = rolled_along(flat.polygon, polygon);
+  const double held = energy_of(flat, rolled ? after_rolling(flat.polygon, polygon, fresh) : state, a, b);
+  const int deepest = static_cast<int>(std::min_element(fresh.gap, fresh.gap + fresh.count) - fresh.gap);
+  const Vec3 &arm_a = fresh.arm_a[deepest], &arm_b = fresh.arm_b[deepest];
+  const double way = arrival(a, b, state.normal, arm_a, arm_b);
+  const double arrived = step_.model != nullptr ? model_energy(a, b, memory[deepest], point_spheres(a, b),
+                                                               {way, fresh.normal, arm_a, arm_b})
+                                                : 0.5 * way * way;
+  return held + std::clamp(arrived, 0.0, std::max(0.0, holds - held));
 }
 
 // The polygon anew, after the points slid or the body tilted; histories go to the new points.
@@ -328,20 +362,22 @@ bool ContactStages::remake(ContactBlock& block, int lane, FlatContact& flat, Pol
   polygon.factor = flat.polygon.factor;
   polygon.shift = flat.polygon.shift;
   PolygonState fresh = now(polygon, *step_.bodies, wall_frame(a), a, b);
-  // Springs keep their energy; what would make them too stiff they lose, which is booked. An old line that
-  // rolled has left the place where it bore.
-  const double held = rolled_along(flat.polygon, polygon) ? energy_after_rolling(flat.polygon, polygon, fresh)
-                                                          : stored_energy(flat.polygon, state);
-  const double holds = stored_energy(polygon, fresh);
-  const int deepest = static_cast<int>(std::min_element(fresh.gap, fresh.gap + fresh.count) - fresh.gap);
-  const double kept =
-      held + arrived(holds - held, a, b, state.normal, fresh.arm_a[deepest], fresh.arm_b[deepest]);
-  if (a >= -1)
-    fresh = give(&polygon, a, b, kept);
-  else if (holds > 0)
-    polygon.factor = std::min(polygon.factor * kept / holds, std::max(kStiffest, polygon.factor));
   int source[kContactPoints];
   match(flat.polygon, state, polygon, fresh, source);
+  PointMemories memory{};
+  if (step_.model != nullptr)
+    for (int k = 0; k < polygon.count; ++k) memory[k] = pool_.memory(flat.points, source[k]);
+  const double holds = step_.model != nullptr ? model_energy(polygon, fresh, a, b, memory.data())
+                                              : stored_energy(polygon, fresh);
+  // What would make the springs too stiff they lose, which is booked.
+  const double kept = kept_energy(flat, state, polygon, fresh, a, b, memory.data(), holds);
+  if (a < -1) {
+    if (holds > 0)
+      polygon.factor = std::min(polygon.factor * kept / holds, std::max(kStiffest, polygon.factor));
+  } else {
+    fresh =
+        step_.model != nullptr ? give_model(&polygon, a, b, kept, memory.data()) : give(&polygon, a, b, kept);
+  }
   if (step_.model != nullptr) {
     remake_model(flat, polygon, source);
     state = fresh;
@@ -400,7 +436,7 @@ ContactStages::LeftPolygon ContactStages::leave_flat(ContactBlock& block, int la
   const int a = block.a[lane], b = block.b[lane];
   LeftPolygon left;
   left.any = true;
-  left.normal_energy = stored_energy(flat.polygon, state);
+  left.normal_energy = energy_of(flat, state, a, b);
   if (step_.model != nullptr) {
     ContactState single{};
     leave_model(block, lane, flat, state, overlap, &single);
@@ -431,18 +467,24 @@ ContactStages::LeftPolygon ContactStages::leave_flat(ContactBlock& block, int la
 // normal. What its springs hold less than the polygon's did is booked.
 void ContactStages::settle_left(ContactBlock& block, int lane, Results& results, const LeftPolygon& left) {
   const int a = block.a[lane], b = block.b[lane];
-  const double kn = step_.model != nullptr ? 1 : step_.laws[block.law[lane]].kn;
   const bool touching = results.touching[lane] != 0;
-  const double full = 0.5 * kn * results.gap[lane] * results.gap[lane];
+  ContactGeometry g = results.geometry(lane);
+  const double overlap = -results.gap[lane], kn = step_.model != nullptr ? 0 : step_.laws[block.law[lane]].kn;
+  const auto unit = [&](double to) {
+    g.overlap = to;
+    return step_.model != nullptr ? model_energy(block, lane, g) : 0.5 * kn * to * to;
+  };
+  const double full = touching ? unit(overlap) : 0;
   double held = left.normal_energy;
-  if (touching) {
-    const ContactGeometry g = results.geometry(lane);
-    held += kn * arrived((full - held) / kn, a, b, g.normal, g.arm_a, g.arm_b);
-  }
+  if (touching)
+    held += std::clamp(unit(arrival(a, b, g.normal, g.arm_a, g.arm_b)), 0.0, std::max(0.0, full - held));
   double &weight = block.field[kWeight][lane], &shift = block.field[kShift][lane];
-  weight = touching ? std::clamp(held / full, a < -1 ? kSoftest : 1, kStiffest) : 1;
-  shift = results.shift[lane] =
-      touching && weight > held / full && a >= -1 ? -results.gap[lane] - std::sqrt(2 * held / kn) : 0;
+  weight = full > 0 ? std::clamp(held / full, a < -1 ? kSoftest : 1, kStiffest) : 1;
+  shift = 0;
+  if (full > 0 && weight > held / full && a >= -1)
+    shift =
+        overlap - (step_.model != nullptr ? overlap_holding(held, overlap, unit) : std::sqrt(2 * held / kn));
+  results.shift[lane] = shift;
   if (step_.model != nullptr) return;
   double energy = held + left.tangential_energy;
   ContactState single{};
@@ -451,7 +493,7 @@ void ContactStages::settle_left(ContactBlock& block, int lane, Results& results,
     // Springs that more of the stiffness is taken for gain nothing by it.
     const double spring = 0.5 * own.kt * left.spring.squaredNorm();
     const double share_of = spring > left.tangential_energy ? std::sqrt(left.tangential_energy / spring) : 1;
-    const ContactGeometry g = results.geometry(lane);
+    g = results.geometry(lane);
     take_over(own, g, motion_of(record(a)), motion_of(record(b)), step_.dt, share_of * left.spring, &single);
     energy -= 0.5 * own.kn * g.overlap * g.overlap + stored_energy(own, single).tangential_spring;
   }

@@ -19,6 +19,7 @@
 #include <cstring>
 
 #include "scene/contact_results.h"
+#include "scene/wall_energy.h"
 
 namespace nurbs {
 namespace {
@@ -54,10 +55,8 @@ SphereCurvatures ContactStages::model_curvatures(const ContactBlock& block, int 
   const int a = block.a[lane], b = block.b[lane];
   const bool wall = a < 0;
   const Bodies& bodies = *step_.bodies;
+  if (step_.model->volume_radius() || pool_.is_polygon(block)) return point_spheres(a, b);
   const double cap = wall ? record(b).radius : smaller_radius(a, b);
-  if (step_.model->volume_radius())
-    return {wall ? 0 : volume_curvature(bodies.particle(a)), volume_curvature(bodies.particle(b))};
-  if (pool_.is_polygon(block)) return flat_curvatures(cap, wall);
   PointMemory on[2];
   block.get(lane, kLocalModelSize, 10, on);
   const SurfaceCurvature of_b = curvature_at(bodies.particle(b), on[1], -g.normal);
@@ -68,6 +67,14 @@ SphereCurvatures ContactStages::model_curvatures(const ContactBlock& block, int 
   const SurfaceCurvature of_a =
       c.radius > 0 ? cylinder_curvature(c.origin, c.axis, c.radius, point, g.normal) : plane_curvature();
   return sphere_curvatures(of_a, of_b, g.normal, cap, true);
+}
+
+SphereCurvatures ContactStages::point_spheres(int a, int b) const {
+  const bool wall = a < 0;
+  const Bodies& bodies = *step_.bodies;
+  if (step_.model->volume_radius())
+    return {wall ? 0 : volume_curvature(bodies.particle(a)), volume_curvature(bodies.particle(b))};
+  return flat_curvatures(wall ? record(b).radius : smaller_radius(a, b), wall);
 }
 
 void ContactStages::forget_spheres(ContactBlock& block, int lane) {
@@ -84,9 +91,8 @@ void ContactStages::apply_model(ContactBlock& block, const Results& results) {
 }
 
 // The question that a contact puts to the model, without its history.
-ModelContact ContactStages::model_contact(const ContactBlock& block, int lane, const ContactGeometry& g,
+ModelContact ContactStages::model_contact(int a, int b, const ContactGeometry& g,
                                           const ModelMemory& own) const {
-  const int a = block.a[lane], b = block.b[lane];
   const BodyRecord &ra = record(a), &rb = record(b);
   ModelContact c;
   c.a = a;
@@ -108,22 +114,83 @@ ModelContact ContactStages::model_contact(const ContactBlock& block, int lane, c
   return c;
 }
 
-// What the model would hold across the normal at another geometry, for the whole stiffness.
-double ContactStages::model_energy(const ContactBlock& block, int lane, const ContactGeometry& g) {
-  ModelMemory own = model_memory(block, lane);
+// What the model would hold across the normal at a geometry, for the whole stiffness, with the history of a
+// memory and these spheres.
+double ContactStages::model_energy(int a, int b, const double* memory, const SphereCurvatures& spheres,
+                                   const ContactGeometry& g) const {
+  ModelMemory own;
+  std::memcpy(&own, memory, sizeof own);
+  own.curvature_a = spheres.a;
+  own.curvature_b = spheres.b;
   double history[kMostModelMemory] = {};
   if (own.kind == step_.model->kind())
-    std::copy_n(pool_.memory(block, lane) + kModelMemory, pool_.memory_size() - kModelMemory, history);
-  if (own.kind != step_.model->kind() || (own.curvature_a == 0 && own.curvature_b == 0)) {
-    const SphereCurvatures k = model_curvatures(block, lane, g);
-    own.curvature_a = k.a;
-    own.curvature_b = k.b;
-  }
-  ModelContact c = model_contact(block, lane, g, own);
+    std::copy_n(memory + kModelMemory, pool_.memory_size() - kModelMemory, history);
+  ModelContact c = model_contact(a, b, g, own);
   c.moves_on = false;
   c.history = history;
   step_.model->force(c);
   return std::isfinite(c.normal_energy) ? c.normal_energy : 0;
+}
+
+// The same of a contact as it is.
+double ContactStages::model_energy(const ContactBlock& block, int lane, const ContactGeometry& g) const {
+  const double* memory = pool_.memory(block, lane);
+  const auto& own = *reinterpret_cast<const ModelMemory*>(memory);
+  const bool known = own.kind == step_.model->kind() && (own.curvature_a != 0 || own.curvature_b != 0);
+  return model_energy(
+      block.a[lane], block.b[lane], memory,
+      known ? SphereCurvatures{own.curvature_a, own.curvature_b} : model_curvatures(block, lane, g), g);
+}
+
+// Of a polygon's points, each with the history of a memory.
+double ContactStages::model_energy(const ContactPolygon& polygon, const PolygonState& state, int a, int b,
+                                   const double* const* memory) const {
+  const SphereCurvatures spheres = point_spheres(a, b);
+  double sum = 0;
+  for (int k = 0; k < polygon.count; ++k)
+    if (state.gap[k] < 0)
+      sum += polygon.weight[k] * model_energy(a, b, memory[k], spheres,
+                                              {-state.gap[k], state.normal, state.arm_a[k], state.arm_b[k]});
+  return polygon.factor * sum;
+}
+
+ContactStages::PointMemories ContactStages::point_memories(const FlatContact& flat) const {
+  PointMemories memory;
+  for (int k = 0; k < kContactPoints; ++k) memory[k] = pool_.memory(flat.points, k);
+  return memory;
+}
+
+// What give_energy does, of a model's energy: by regula falsi on a power of it that is nearly linear in the
+// shift, with halvings in between.
+PolygonState ContactStages::give_model(ContactPolygon* polygon, int a, int b, double energy,
+                                       const double* const* memory) const {
+  constexpr int kSteps = 24, kHalved = 4;
+  constexpr double kSameEnergy = 1e-12, kPower = 0.4;  // Hertz's overlap, of the energy
+  const double most = std::max(kStiffest, polygon->factor), kept = polygon->shift;
+  double held = 0;
+  const auto at = [&](double shift) {
+    polygon->shift = shift;
+    const PolygonState state = polygon_state(*polygon, b, wall_frame(a), a);
+    held = model_energy(*polygon, state, a, b, memory);
+    return state;
+  };
+  polygon->factor = 1;
+  PolygonState state = at(0);
+  const double all = std::max(0.0, -state.least);
+  if (!(energy > 0)) return at(all);
+  if (!(held > 0)) return state;
+  polygon->factor = std::clamp(energy / held, 1.0, most);
+  if (energy >= (1 - kSameEnergy) * held) return state;
+  const double wanted = std::pow(energy, kPower);
+  double low = 0, high = all, at_low = std::pow(held, kPower), at_high = 0;
+  for (int k = 0; k < kSteps; ++k) {
+    const double share = k % kHalved == kHalved - 1 ? 0.5 : (at_low - wanted) / (at_low - at_high);
+    state = at(k == 0 && kept > 0 && kept < all ? kept : low + share * (high - low));
+    if (std::abs(held - energy) <= kSameEnergy * energy) break;
+    (held > energy ? low : high) = polygon->shift;
+    (held > energy ? at_low : at_high) = std::pow(std::max(0.0, held), kPower);
+  }
+  return state;
 }
 
 // Dampers are linear in the velocity: it gets their share (Results::damper_share). Across the normal, where
@@ -146,7 +213,7 @@ void ContactStages::ask_model(ContactBlock& block, int lane, const ContactGeomet
     own.curvature_a = k.a;
     own.curvature_b = k.b;
   }
-  ModelContact c = model_contact(block, lane, g, own);
+  ModelContact c = model_contact(a, b, g, own);
   c.moves_on = moves_on;
   c.history = pool_.memory(block, lane) + kModelMemory;
   const Vec3 velocity = c.velocity;

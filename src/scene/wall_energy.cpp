@@ -36,22 +36,15 @@ double ContactStages::unit_energy(std::int32_t number, int body, const ContactGe
   return 0.5 * step_.laws[block.law[lane]].kn * g.overlap * g.overlap;
 }
 
-// The overlap at which such a contact holds an energy; a model's is near enough a power of it.
+// The overlap at which such a contact holds an energy.
 double ContactStages::overlap_of(std::int32_t number, int body, ContactGeometry g, double energy) {
-  if (!(energy > 0)) return 0;
   const ContactBlock& block = pool_.block(number);
   if (step_.model == nullptr)
-    return std::sqrt(2 * energy / step_.laws[block.law[ContactPool::lane(number)]].kn);
-  double power = 2.25;
-  double held = unit_energy(number, body, g);
-  for (int k = 0; k < 8 && held > 0 && std::abs(held - energy) > 1e-9 * energy; ++k) {
-    const double before = g.overlap, last = held;
-    g.overlap *= std::pow(energy / held, 1 / power);
-    held = unit_energy(number, body, g);
-    const double way = std::log(g.overlap / before);
-    if (way != 0 && held > 0) power = std::clamp(std::log(held / last) / way, 1.0, 4.0);
-  }
-  return g.overlap;
+    return std::sqrt(2 * std::max(0.0, energy) / step_.laws[block.law[ContactPool::lane(number)]].kn);
+  return overlap_holding(energy, g.overlap, [&](double overlap) {
+    g.overlap = overlap;
+    return unit_energy(number, body, g);
+  });
 }
 
 // Of a polygon's points in this pose, with the wall `shift` further back.
@@ -63,15 +56,7 @@ double ContactStages::polygon_energy(std::int32_t number, int body, double shift
   const ContactBlock& block = pool_.block(number);
   if (step_.model == nullptr)
     return step_.laws[block.law[ContactPool::lane(number)]].kn * stored_energy(polygon, state);
-  double sum = 0;
-  for (int k = 0; k < state.count; ++k) {
-    if (!(state.gap[k] < 0)) continue;
-    flat.points.b[k] = body;
-    flat.points.a[k] = -1 - number;
-    sum += polygon.factor * polygon.weight[k] *
-           model_energy(flat.points, k, {-state.gap[k], state.normal, state.arm_a[k], state.arm_b[k]});
-  }
-  return sum;
+  return model_energy(polygon, state, -1 - number, body, point_memories(flat).data());
 }
 
 // What a contact that ends would hold in this pose.

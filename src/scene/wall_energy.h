@@ -38,17 +38,37 @@ inline ContactRest rest_of(const ContactState& s, const BodyRecord& a, const Bod
   r.rests = std::abs(s.rate) * s.dt <= wide && std::abs(change) * s.dt <= wide * r.phase;
   return r;
 }
-// Of the first `count` points of a polygon: all of those that bear rest, and the slowest one's phase.
+// Of the first `count` points of a polygon: all of those that bear rest, and the slowest one's phase. One on
+// which none bears doesn't.
 inline ContactRest rest_of(const FlatContact& flat, int count, const BodyRecord& a, const BodyRecord& b) {
   ContactRest all{1, true};
+  bool bears = false;
   for (int k = 0; k < count && all.rests; ++k) {
     ContactState point;
     flat.points.get(k, kStateField, kContactStateSize, &point);
     if (point.active == 0) continue;
     const ContactRest one = rest_of(point, a, b);
     all = {std::min(all.phase, one.phase), one.rests};
+    bears = true;
   }
-  return all;
+  return bears ? all : ContactRest{};
+}
+
+// The overlap at which a contact holds an energy, `unit(overlap)` of which is nearly a power; from an overlap
+// at which it holds some.
+template <class Unit>
+double overlap_holding(double energy, double overlap, const Unit& unit) {
+  if (!(energy > 0)) return 0;
+  double power = 2.25;
+  double held = unit(overlap);
+  for (int k = 0; k < 8 && held > 0 && std::abs(held - energy) > 1e-9 * energy; ++k) {
+    const double before = overlap, last = held;
+    overlap *= std::pow(energy / held, 1 / power);
+    held = unit(overlap);
+    const double way = std::log(overlap / before);
+    if (way != 0 && held > 0) power = std::clamp(std::log(held / last) / way, 1.0, 4.0);
+  }
+  return overlap;
 }
 
 // A contact of a body in the balance.

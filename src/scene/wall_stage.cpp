@@ -36,7 +36,7 @@ std::int32_t ContactStages::adopt_listed(std::int32_t number) {
   Partner& p = partner(number);
   p = Partner{};
   for (int k = 0; k < 9; k += 4) p.record.turn[k] = 1;
-  p.record.radius = kFarAway;
+  p.record.radius = p.record.inner = kFarAway;
   bind_listed(number, 0);
   return number;
 }

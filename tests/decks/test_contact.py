@@ -381,6 +381,21 @@ dump p all local 100 pgl.dump c_pgl[7] c_pgl[8] c_pgl[10] c_pgl[11] c_pgl[12] c_
             found.append((pair, wall, list(run.tables[0]["st[11]"])))
         self.assertEqual(*found)
 
+    def test_thin_bodies_that_go_through_each_other_are_told_of(self):
+        """Rods 20 : 1, crossed, that come back from each other or go through, by far less than their bounding radius."""
+        rod = deck.shape_file("capsule", 0.05, length=1.9)
+        turn = 0.5**0.5
+        for speed, told in ((0.5, False), (40, True)):
+            atoms = [(1, 1, 1, 0.05, 2500.0, 0.0, 0.0, 0.2, turn, turn, 0.0, 0.0),
+                     (2, 1, 1, 0.05, 2500.0, 0.0, 0.0, 0.21, turn, 0.0, turn, 0.0)]
+            speeds = [(1, 0.0, 0.0, speed, 0.0, 0.0, 0.0), (2, 0.0, 0.0, -speed, 0.0, 0.0, 0.0)]
+            run = deck.run_ok(scene(extra="dump_modify d every 50", run=f"run {round(3000 / speed)}"), files={**files(), "ell.json": rod,
+                                                            "bodies.data": deck.data_file(atoms, speeds, BOX, types=2)})
+            frame = run.dump("out.dump")[-1][1]
+            self.assertEqual(bool(frame["z"][0] > frame["z"][1]), told)
+            warned = self.warnings(run, "Pair gran/nurbs: in the run bodies overlapped by as much as")
+            self.assertEqual(len(warned), int(told))
+
     def test_shallow_contacts_are_not_warned_of(self):
         self.assertFalse(self.warnings(deck.run_ok(scene(run="run 4321\nrun 1"), files=files()), "in the run"))
 

@@ -346,6 +346,33 @@ class Energy(unittest.TestCase):
                     self.assertLess(abs(kinetic[-1] / kinetic[0] - 1), 1e-6)
                     self.assertLess(np.abs(total / total[0] - 1).max(), 1e-6)
 
+    def test_elastic_collisions_of_flat_bodies_keep_it(self):
+        """Corners and edges come down flat, and roll; a rounded box gained 40 % on the floor, two boxes lost 45 %."""
+        rounded = deck.shape_file("rounded-box", 1, 0.8, 0.6, rounding=0.15)
+        turned = np.random.default_rng(5)
+        grid = [(x, y, 0.0155) for x in (-0.06, -0.02, 0.02, 0.06) for y in (-0.05, 0, 0.05)]
+        several = [Body(1, x, (0, 0, -0.2), unit(*turned.normal(size=4)), tuple(turned.uniform(-3, 3, 3))) for x in grid]
+        one = Body(1, (0, 0, 0.0153), (0, 0, -0.2),
+                   (0.6176912787777149, 0.6950166964508822, 0.031808364872708716, -0.3666026509732002),
+                   (-0.0273894774, -0.303053551, 0.909557836))
+        x, v = np.array((-0.006305325, 0.007823068, 0.012394956)), (0.032068621, -0.053033789, -0.078479429)
+        pair = [Body(1, tuple(x), v, (0.942031194384051, -0.28458639980668865, -0.16367988631313998, 0.06924824621619622),
+                     (0.4516732, -0.7452786, 0.374747)),
+                Body(1, tuple(-x), tuple(-c for c in v),
+                     (-0.47970347823412623, 0.2473590729762991, 0.8376282597882744, 0.0841246717108258),
+                     (0.5617568, -0.075104, 0.5617568))]
+        for name, bodies, shape, floor, most in (("one", [one], rounded, True, 2e-3), ("several", several, rounded, True, 5e-4),
+                                                 ("pair", pair, deck.box_shape(1, 0.8, 0.6), False, 5e-4)):
+            for words in ("hertz tangential no_history", "hooke tangential no_history"):
+                with self.subTest(name, words=words):
+                    t = run_bodies(bodies, [shape], words, floor=floor, dt=1.3e-5, steps=20000, every=200).thermo
+                    kinetic = t["KinEng"] + t["spin"]
+                    total = kinetic + t["held[1]"]
+                    self.assertGreater(t["held[1]"].max(), 1e-2 * kinetic[0])
+                    self.assertEqual(t["held[1]"][-1], 0)
+                    self.assertLess(abs(kinetic[-1] / kinetic[0] - 1), most)
+                    self.assertLess(np.abs(total / total[0] - 1).max(), 5 * most)
+
     def test_ledger_closes_with_everything_on(self):
         """Damping, friction, rolling: the error of the sum falls with the square of the time step."""
         values = {**PLAIN, "coefficientRestitution": 0.5, "coefficientFriction": 0.4}
@@ -552,6 +579,8 @@ class BadInput(unittest.TestCase):
                 self.expect("\n".join(lines) + "\n", files, name)
         lines = [line.replace(line.split()[-1], "-0.5") if "coefficientFriction " in line else line for line in good.splitlines()]
         self.expect("\n".join(lines) + "\n", files, "coefficientFriction of types 1 1 = -0.5", ">= 0")
+        lines = [line.replace("peratomtype 5000000.0", "peratomtype -5e6") for line in good.splitlines()]
+        self.expect("soft_particles yes\n" + "\n".join(lines) + "\n", files, "youngsModulus of type 1 = -5000000 must be > 0")
         self.expect(good.replace("pair_coeff * *", "pair_coeff * * kn 1 kt 1 mu 0"), files, "fix property/global")
         self.expect(good.replace(" model hertz tangential history\npair", "\npair", 1), files, "Pair coeff * *", "kn KN")
 

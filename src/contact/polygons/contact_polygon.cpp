@@ -157,16 +157,17 @@ bool rolled_along(const ContactPolygon& old, const ContactPolygon& polygon) {
   return true;
 }
 
-double energy_after_rolling(const ContactPolygon& old, const ContactPolygon& polygon,
-                            const PolygonState& state) {
+PolygonState after_rolling(const ContactPolygon& old, const ContactPolygon& polygon,
+                           const PolygonState& state) {
   PolygonState rolled = state;
   rolled.energy = 0;
   for (int i = 0; i < 2; ++i) {
     const double t = along(polygon, old.point[i]);
-    const double overlap = std::max(0.0, -(state.gap[0] + t * (state.gap[1] - state.gap[0])));
+    rolled.gap[i] = state.gap[0] + t * (state.gap[1] - state.gap[0]);
+    const double overlap = std::max(0.0, -rolled.gap[i]);
     rolled.energy += 0.5 * old.weight[i] * overlap * overlap;
   }
-  return stored_energy(old, rolled);
+  return rolled;
 }
 
 double continuity_factor(double energy, const ContactPolygon& polygon, const PolygonState& state) {

@@ -174,11 +174,11 @@ double stored_energy(const ContactPolygon& polygon, const PolygonState& state);
 // not much shorter. Another edge of the body is not.
 bool rolled_along(const ContactPolygon& old, const ContactPolygon& polygon);
 
-// What `old` holds once its points have gone to the line where the new polygon of the same bodies lies, each
+// `old`, two points, once they have gone to the line where the new polygon of the same bodies lies, each
 // staying where it is along it: both are segments of ruled lines, and rolling costs nothing. `state` is the
 // new one's.
-double energy_after_rolling(const ContactPolygon& old, const ContactPolygon& polygon,
-                            const PolygonState& state);
+PolygonState after_rolling(const ContactPolygon& old, const ContactPolygon& polygon,
+                           const PolygonState& state);
 // The factor that gives the polygon the energy U / kn; 1 where one of the two has none.
 double continuity_factor(double energy, const ContactPolygon& polygon, const PolygonState& state);
 // Gives it that energy by its factor where it holds less, up to `stiffest` (or what it had), and where it
