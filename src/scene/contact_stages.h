@@ -265,7 +265,9 @@ class ContactStages {
   PolygonState give_model(ContactPolygon* polygon, int a, int b, double energy,
                           const double* const* memory) const;
   ModelContact model_contact(int a, int b, const ContactGeometry& geometry, const ModelMemory& own) const;
-  SphereCurvatures point_spheres(int a, int b) const;  // of a polygon's points
+  SphereCurvatures point_spheres(int a, int b) const;                            // of a polygon's points ...
+  SphereCurvatures inherited_spheres(const double* memory, int a, int b) const;  // ... or those remembered
+  bool knows_spheres(const double* memory) const;
   void forget_spheres(ContactBlock& block, int lane);  // of a body that is another now
   SphereCurvatures model_curvatures(const ContactBlock& block, int lane,
                                     const ContactGeometry& geometry) const;

@@ -346,9 +346,10 @@ double ContactStages::kept_energy(const FlatContact& flat, const PolygonState& s
   const int deepest = static_cast<int>(std::min_element(fresh.gap, fresh.gap + fresh.count) - fresh.gap);
   const Vec3 &arm_a = fresh.arm_a[deepest], &arm_b = fresh.arm_b[deepest];
   const double way = arrival(a, b, state.normal, arm_a, arm_b);
-  const double arrived = step_.model != nullptr ? model_energy(a, b, memory[deepest], point_spheres(a, b),
-                                                               {way, fresh.normal, arm_a, arm_b})
-                                                : 0.5 * way * way;
+  const double arrived = step_.model != nullptr
+                             ? model_energy(a, b, memory[deepest], inherited_spheres(memory[deepest], a, b),
+                                            {way, fresh.normal, arm_a, arm_b})
+                             : 0.5 * way * way;
   return held + std::clamp(arrived, 0.0, std::max(0.0, holds - held));
 }
 

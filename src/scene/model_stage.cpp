@@ -7,8 +7,8 @@
 // rolls, follows the bodies' curvatures slowly.
 //
 // Polygons (flat_stage.cpp). Every point asks the model for a contact of its overlap with the flat effective
-// radius, and takes its weight's share of force, torque and energy: under a uniform gap the whole is one
-// contact.
+// radius, or the spheres of the contact whose place it takes, and takes its weight's share of force, torque
+// and energy: under a uniform gap the whole is one contact.
 //
 // Energy. What a model dissipates isn't known from its force. Booked is the energy that the contact took out
 // of the motion (trapezoidal rule over velocities of half steps: what velocity Verlet does, but for terms of
@@ -132,24 +132,34 @@ double ContactStages::model_energy(int a, int b, const double* memory, const Sph
   return std::isfinite(c.normal_energy) ? c.normal_energy : 0;
 }
 
+// Spheres that a contact remembers, and whether it does.
+bool ContactStages::knows_spheres(const double* memory) const {
+  const auto& own = *reinterpret_cast<const ModelMemory*>(memory);
+  return own.kind == step_.model->kind() && (own.curvature_a != 0 || own.curvature_b != 0);
+}
+static SphereCurvatures spheres_of(const double* memory) {
+  const auto& own = *reinterpret_cast<const ModelMemory*>(memory);
+  return {own.curvature_a, own.curvature_b};
+}
+SphereCurvatures ContactStages::inherited_spheres(const double* memory, int a, int b) const {
+  return knows_spheres(memory) ? spheres_of(memory) : point_spheres(a, b);
+}
+
 // The same of a contact as it is.
 double ContactStages::model_energy(const ContactBlock& block, int lane, const ContactGeometry& g) const {
   const double* memory = pool_.memory(block, lane);
-  const auto& own = *reinterpret_cast<const ModelMemory*>(memory);
-  const bool known = own.kind == step_.model->kind() && (own.curvature_a != 0 || own.curvature_b != 0);
-  return model_energy(
-      block.a[lane], block.b[lane], memory,
-      known ? SphereCurvatures{own.curvature_a, own.curvature_b} : model_curvatures(block, lane, g), g);
+  const SphereCurvatures spheres =
+      knows_spheres(memory) ? spheres_of(memory) : model_curvatures(block, lane, g);
+  return model_energy(block.a[lane], block.b[lane], memory, spheres, g);
 }
 
 // Of a polygon's points, each with the history of a memory.
 double ContactStages::model_energy(const ContactPolygon& polygon, const PolygonState& state, int a, int b,
                                    const double* const* memory) const {
-  const SphereCurvatures spheres = point_spheres(a, b);
   double sum = 0;
   for (int k = 0; k < polygon.count; ++k)
     if (state.gap[k] < 0)
-      sum += polygon.weight[k] * model_energy(a, b, memory[k], spheres,
+      sum += polygon.weight[k] * model_energy(a, b, memory[k], inherited_spheres(memory[k], a, b),
                                               {-state.gap[k], state.normal, state.arm_a[k], state.arm_b[k]});
   return polygon.factor * sum;
 }
@@ -313,11 +323,16 @@ void ContactStages::finish_model(ContactBlock& block, int lane) {
   std::fill_n(pool_.memory(block, lane), pool_.memory_size(), 0.0);
 }
 
-// A contact that takes another one's place: it has its history, and its spheres are to be found.
+// A contact that takes another one's place: it has its history, its spheres, so that it is as stiff, and its
+// age, with which they come to those of its own.
 void ContactStages::take_over_model(const double* from, ContactBlock& block, int lane) {
   double* to = pool_.memory(block, lane);
   ModelMemory own{};
-  own.kind = reinterpret_cast<const ModelMemory*>(from)->kind;
+  const auto& old = *reinterpret_cast<const ModelMemory*>(from);
+  own.kind = old.kind;
+  own.curvature_a = old.curvature_a;
+  own.curvature_b = old.curvature_b;
+  own.phase = old.phase;
   std::memcpy(to, &own, sizeof own);
   std::copy_n(from + kModelMemory, pool_.memory_size() - kModelMemory, to + kModelMemory);
 }

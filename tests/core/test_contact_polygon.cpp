@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "body/flat_faces.h"
+#include "body/support.h"
 #include "contact/pair_search.h"
 #include "contact/polygons/contact_polygon.h"
 #include "support/bodies.h"
@@ -413,6 +414,37 @@ TEST(PairPolygon, forces_are_the_gradient_of_the_energy) {
       EXPECT_NEAR(on_second[k], -second_slope, 1e-7 * size) << k;
     }
   }
+}
+
+// A rounded edge lies on a face, a hair askew: its support is on the ball at one end, and was taken for one
+// contact there, which a turn of 1e-7 rad moved to the other end. Leaning further it bears at one end only.
+TEST(PairPolygon, a_rounded_edge_on_a_face_bears_on_both_ends) {
+  const ShapePointer body = soap();
+  const double overlap = 0.02;
+  for (const bool swap : {false, true})
+    for (const double askew : {0.0, 1e-4, -1e-4, 1e-3, -1e-3, 5e-3, 0.05, -0.05}) {
+      SCOPED_TRACE(std::to_string(askew) + (swap ? " swapped" : ""));
+      Random random(31);
+      const Scene scene(random);
+      const Quat turn =
+          Quat(Eigen::AngleAxisd(askew, Vec3::UnitY())) * Quat(Eigen::AngleAxisd(0.3, Vec3::UnitX()));
+      const Particle face = scene.place(*body, Vec3::Zero(), Quat::Identity());
+      Particle edge = scene.place(*body, Vec3::Zero(), turn);
+      const Vec3 up = scene.q * Vec3::UnitZ();
+      const double low = find_hull_support(*body, edge.q.conjugate() * -up).h;
+      edge.x = face.x + (0.6 + low - overlap) * up;
+      const Particle &a = swap ? edge : face, &b = swap ? face : edge;
+      double memory[kPairMemorySize] = {0};
+      const ContactResult r = find_contact(a, b, {}, memory);
+      ASSERT_NEAR(r.gap, -overlap, 0.1 * overlap);
+      ContactPolygon polygon;
+      const bool made = make_pair_polygon(a, b, r.normal, -r.gap, -kReach * r.gap, nullptr, &polygon);
+      ASSERT_EQ(made, std::abs(askew) < 0.01);
+      if (made) {
+        EXPECT_EQ(polygon.count, 2);
+        EXPECT_EQ(polygon.rolling, 1);
+      }
+    }
 }
 
 // A ruled line is remade every step: its energy is then a function of the pose, and the same forces its

@@ -361,8 +361,16 @@ class Energy(unittest.TestCase):
                 Body(1, tuple(-x), tuple(-c for c in v),
                      (-0.47970347823412623, 0.2473590729762991, 0.8376282597882744, 0.0841246717108258),
                      (0.5617568, -0.075104, 0.5617568))]
+        # An edge rolled on to where the face that leans over it is open.
+        x, v = np.array((-0.002188, 0.015748733, 0.0058821786)), (0.0116865, -0.0910271772, -0.0397174850)
+        lean = [Body(1, tuple(x), v, (-0.3280771572516928, 0.4650724614879329, 0.3718171368459795, 0.7333655304163547),
+                     (-0.4081081, -0.4620404, 0.6438791)),
+                Body(1, tuple(-x), tuple(-c for c in v),
+                     (0.6863744121746117, -0.5937058006271023, -0.41280502216662807, -0.07743127460979443),
+                     (-0.7213232, 0.0197925, 0.6675686))]
         for name, bodies, shape, floor, most in (("one", [one], rounded, True, 2e-3), ("several", several, rounded, True, 5e-4),
-                                                 ("pair", pair, deck.box_shape(1, 0.8, 0.6), False, 5e-4)):
+                                                 ("pair", pair, deck.box_shape(1, 0.8, 0.6), False, 5e-4),
+                                                 ("leaning pair", lean, rounded, False, 2e-3)):
             for words in ("hertz tangential no_history", "hooke tangential no_history"):
                 with self.subTest(name, words=words):
                     t = run_bodies(bodies, [shape], words, floor=floor, dt=1.3e-5, steps=20000, every=200).thermo

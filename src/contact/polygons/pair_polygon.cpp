@@ -19,13 +19,16 @@ constexpr double kPairShare = 0.5;   // as kWayShare, where the overlap's growth
 constexpr double kMostAcross = 0.1;  // rad: one step of the search for the least overlap across lines
 constexpr int kAcrossSteps = 12;     // of them; 2 to 3 are usual
 
-// How far a pair may go before `d`, which a body's support point is along, may come square to a ruled line:
-// before that no such line supports the body. Relative turns are ways, at the smaller radius at least; of
-// those of the normal each takes kClearTurn of it.
-double turn_room(const Body& body, const SurfacePoint& where, const Vec3& d, double smaller) {
+// How far a pair may go before `d`, which a body's support point is along, may come so near to square to a
+// ruled line, `lag` behind the support, that it lags by `most`: before that no such line supports the body.
+// Relative turns are ways, at the smaller radius at least; of those of the normal each takes kClearTurn of
+// it.
+double turn_room(const Body& body, const SurfacePoint& where, const Vec3& d, double lag, double most,
+                 double smaller) {
   constexpr double kMostTurn = 0.3;
+  if (!(lag > most)) return 0;
   const double turn = std::min(kMostTurn, turn_to_ruled_line(*body.shape, where, d));
-  return turn * smaller / (kPairShare * (1 + 1 / kClearTurn));
+  return (1 - most / lag) * turn * smaller / (kPairShare * (1 + 1 / kClearTurn));
 }
 
 // One attempt at a pair's polygon with a given face as the reference.
@@ -49,8 +52,9 @@ class FaceContact {
   }
 
   // How far all points of both bodies may go while something of whatever may lie over the reference face is
-  // sure to be higher than `most`, so that make() fails; 0 where that is not seen.
-  double room(double most) {
+  // sure to be higher than `most`, so that make() fails, or to lean too far for `reach`; 0 where that is not
+  // seen.
+  double room(double most, double reach) {
     const Opposite o = opposite();
     double least = face_room(o, most);
     if (least == 0) least = shared_room(o, most);
@@ -64,9 +68,9 @@ class FaceContact {
     Support support;
     if (!incident_line(&line, &support)) return least;
     double of_line = segment_room(line.ends, most);
-    if (of_line == 0 && !is_on_line(*incident_.shape, support.point, line.ends[0], line.ends[1]))
-      of_line =
-          turn_room(incident_, support.where, down(), std::min(reference_.radius(), incident_.radius()));
+    if (of_line == 0)
+      of_line = turn_room(incident_, support.where, down(), lean_of(line, support), kLeaning * reach,
+                          std::min(reference_.radius(), incident_.radius()));
     return std::min(least, of_line);
   }
 
@@ -75,10 +79,10 @@ class FaceContact {
   bool make(double overlap, double reach, double depth, double kept, ContactPolygon* out, bool* swallowed) {
     *swallowed = false;
     const double most = reach - overlap;
-    if (!face_points(most, swallowed) || !bears_deepest(kept, depth)) {
+    if (!face_points(most, swallowed) || !bears_deepest(kept, overlap, depth)) {
       *swallowed = false;
       ring_ = -1;
-      if (!crease_points(overlap, most) && !line_points(overlap, most)) return false;
+      if (!crease_points(overlap, most) && !line_points(overlap, reach)) return false;
     }
     if (!finish(points_, reach, nullptr, out)) return false;
     out->reference = reference_.index;
@@ -242,10 +246,11 @@ class FaceContact {
   }
 
   // Whether the face's points are as deep as what else of the incident body lies over the reference face:
-  // where that leans, a rounded edge may be deeper.
-  bool bears_deepest(double kept, double depth) const {
+  // where that leans, a rounded edge may be deeper; and as deep as the bodies overlap.
+  bool bears_deepest(double kept, double overlap, double depth) const {
     const double deepest = *std::min_element(points_.gap, points_.gap + points_.plane.count);
     if (deepest <= -kept * depth) return true;
+    if (deepest > -kept * overlap) return false;
     const Support top = find_feature_top(*incident_.shape, down());
     return inside_reference(plane_.project(incident_.place(top.point))) < 0;
   }
@@ -303,12 +308,16 @@ class FaceContact {
     return ruled_line(shape, support->where, down(), kLineAngle, line);
   }
 
-  bool line_points(double overlap, double most) {
+  // By how much it lags behind that, a length.
+  double lean_of(const RuledLine& line, const Support& support) const {
+    return incident_.frame.scale * lean(*incident_.shape, down(), support.point, line.ends[0], line.ends[1]);
+  }
+
+  bool line_points(double overlap, double reach) {
     RuledLine line;
     Support support;
-    if (!incident_line(&line, &support) ||
-        !is_on_line(*incident_.shape, support.point, line.ends[0], line.ends[1]) ||
-        !segment(line.ends, {-1, -1}, most, &points_, &whole_) || !points_.bears(overlap))
+    if (!incident_line(&line, &support) || lean_of(line, support) > kLeaning * reach ||
+        !segment(line.ends, {-1, -1}, reach - overlap, &points_, &whole_) || !points_.bears(overlap))
       return false;
     ruled_ = true;
     return true;
@@ -345,9 +354,14 @@ bool support_line(const Body& body, const Vec3& d, double tolerance, double smal
                   double* room) {
   const Vec3 on_body = body.turned_back(d);
   const SupportSet set = support_set(*body.shape, on_body, tolerance / body.frame.scale);
-  if (set.count != 2 || (set.ruled && !is_on_line(*body.shape, set.support, set.point[0], set.point[1]))) {
-    *room =
-        body.shape->flats.edges.empty() && set.face < 0 ? turn_room(body, set.where, on_body, smaller) : 0;
+  const double most = kLeaning * tolerance,
+               lag = set.count == 2 && set.ruled ? body.frame.scale * lean(*body.shape, on_body, set.support,
+                                                                           set.point[0], set.point[1])
+                                                 : kInfinity;
+  if (set.count != 2 || (set.ruled && lag > most)) {
+    *room = body.shape->flats.edges.empty() && set.face < 0
+                ? turn_room(body, set.where, on_body, lag, most, smaller)
+                : 0;
     return false;
   }
   for (int i = 0; i < 2; ++i) {
@@ -526,7 +540,7 @@ bool make_pair_polygon(const Particle& pa, const Particle& pb, const Vec3& norma
       if (faces[face].normal.dot(towards[k]) < kOtherFaceCosine) continue;
       FaceContact other = contact(k, face);
       const double overlap_of = face == nearest[k] ? depth[k] : other.depth(most);
-      room = std::min(room, overlap_of > most ? overlap_of - most : other.room(reach - overlap));
+      room = std::min(room, overlap_of > most ? overlap_of - most : other.room(reach - overlap, reach));
     }
   }
   const double smaller = std::min(a.radius(), b.radius()), larger = std::max(a.radius(), b.radius());

@@ -90,10 +90,11 @@ void set_ring(const Shape& shape, int body, int face, ContactPolygon* out) {
   }
 }
 
-bool is_on_line(const Shape& shape, const Vec3& support, const Vec3& p, const Vec3& q) {
+double lean(const Shape& shape, const Vec3& d, const Vec3& support, const Vec3& p, const Vec3& q) {
   const Vec3 way = q - p, off = support - p;
   const double t = std::clamp(off.dot(way) / way.squaredNorm(), 0.0, 1.0);
-  return (off - t * way).norm() <= kBesideLine * shape.bounding_radius;
+  if ((off - t * way).norm() <= kBesideLine * shape.bounding_radius) return 0;
+  return std::max(0.0, d.dot(support) - std::min(d.dot(p), d.dot(q)));
 }
 
 }  // namespace nurbs::polygon

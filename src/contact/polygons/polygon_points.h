@@ -94,8 +94,11 @@ inline Sector sector(int i, int points) {
 // A whole round face: eight sectors of its outline.
 void set_ring(const Shape& shape, int body, int face, ContactPolygon* out);
 
-// Whether a body's support point is one of a ruled line of its. Pairs ask for it, so that lines beside
-// rounded rims, which lean, make polygons on walls only: of undamped pairs those lose energy.
-bool is_on_line(const Shape& shape, const Vec3& support, const Vec3& p, const Vec3& q);
+// A ruled line beside a rounded rim or corner that bears at one end only is a point: with half its weights it
+// would be half as stiff as the rim. What its far end may lag behind the support, of the reach: half the
+// overlap when new, two when it is remade.
+constexpr double kLeaning = 1.0 / 6;
+// That lag along unit d, where the support is not on the line itself; 0 where it is.
+double lean(const Shape& shape, const Vec3& d, const Vec3& support, const Vec3& p, const Vec3& q);
 
 }  // namespace nurbs::polygon

@@ -9,15 +9,11 @@ namespace {
 
 using namespace polygon;
 
-constexpr double kLeaning = 1.0 / 6;  // of the reach: half the overlap when new, two when it is remade
-
-// The support set that stands on a plane. A ruled line beside a rounded rim that bears at one end only is a
-// point: with half its weights it would be half as stiff as the rim.
+// The support set that stands on a plane.
 SupportSet standing_set(const Shape& shape, const Vec3& d, double tolerance) {
   SupportSet set = support_set(shape, d, tolerance);
-  const bool leans = set.ruled && !is_on_line(shape, set.support, set.point[0], set.point[1]) &&
-                     set.h - std::min(d.dot(set.point[0]), d.dot(set.point[1])) > kLeaning * tolerance;
-  if (leans) set.count = 1;
+  if (set.ruled && lean(shape, d, set.support, set.point[0], set.point[1]) > kLeaning * tolerance)
+    set.count = 1;
   return set;
 }
 
