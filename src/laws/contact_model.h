@@ -38,6 +38,7 @@ struct ModelContact {
   Vec3 torque = Vec3::Zero();  // on B, beside that of the force; A gets the opposite
   double stiffness = 0;        // normal, force / length
   double normal_energy = 0, tangential_energy = 0;
+  double elastic_energy = 0;  // the normal one without what pulls; 0 of models that don't tell
   bool slides = false;
 };
 

@@ -426,7 +426,8 @@ void HostModels::force(ModelContact& c) const {
   c.torque = Vec3::Map(wall ? on_i.delta_torque : on_j.delta_torque);
   c.stiffness = s.kn > 0 ? s.kn : std::fabs(s.Fn) / c.overlap;
   c.slides = models_->slides(s, (c.force - c.force.dot(c.normal) * c.normal).norm());
-  if (models_->elastic()) c.normal_energy = s.kn * c.overlap * c.overlap / (1 + models_->exponent());
+  if (models_->elastic()) c.elastic_energy = s.kn * c.overlap * c.overlap / (1 + models_->exponent());
+  c.normal_energy = c.elastic_energy;
   if (models_->cohesive()) c.normal_energy += models_->cohesive_energy(s);
   if (models_->ids[1] == host::TANGENTIAL_HISTORY)
     c.tangential_energy = 0.5 * s.kt * Vec3::Map(c.history + models_->shear()).squaredNorm();

@@ -150,8 +150,9 @@ class ContactStages {
   // What came of the last step's contacts is carried over to those of this one by place and normal, whatever
   // part of the wall they were on; those without a successor are closed. `balanced`: contacts that come or go
   // at finite overlap neither bring nor, if it can be helped, take energy (wall_energy.cpp); `found` is
-  // changed accordingly.
-  void give(int body, std::int32_t* head, WallContact* found, int count, bool balanced = false);
+  // changed accordingly. `pieces`: of a wall that has some, by which contacts are told apart.
+  void give(int body, std::int32_t* head, WallContact* found, int count, bool balanced = false,
+            bool pieces = true);
   // In place of give, where the body's one contact still is the one with the face that the last give said: so
   // long it needs no search. False where it has none such, or not any more.
   bool stay(int body, std::int32_t head);
@@ -311,7 +312,7 @@ class ContactStages {
   void end_listed(std::int32_t number);
   struct Former;
   int list_former(int body, std::int32_t head, Former* former);
-  void pair_up(int body, Former* former, int formers, const WallContact* found, int count, bool balanced,
+  void pair_up(int body, Former* former, int formers, const WallContact* found, int count, bool pieces,
                std::int32_t* number) const;
   void inherit(std::int32_t number, int body, const Former* former, int formers, const WallContact& found);
   void count_listed(const WallContact& found, std::int32_t number, int body);

@@ -359,7 +359,12 @@ bool ContactStages::remake(ContactBlock& block, int lane, FlatContact& flat, Pol
   const int a = block.a[lane], b = block.b[lane];
   ContactPolygon polygon;
   overlap += flat.polygon.shift;
-  if (!find_polygon(a, b, state.normal, overlap, kKeptReach * overlap, &flat.polygon, &polygon)) return false;
+  const auto find = [&](double reach) {
+    return find_polygon(a, b, state.normal, overlap, reach * overlap, &flat.polygon, &polygon);
+  };
+  if (!find(kKeptReach)) return false;
+  // A face that a line rolls on to is a new polygon.
+  if (flat.polygon.rolling != 0 && polygon.rolling == 0 && !find(2 * kReach)) return false;
   polygon.factor = flat.polygon.factor;
   polygon.shift = flat.polygon.shift;
   PolygonState fresh = now(polygon, *step_.bodies, wall_frame(a), a, b);

@@ -114,8 +114,9 @@ ModelContact ContactStages::model_contact(int a, int b, const ContactGeometry& g
   return c;
 }
 
-// What the model would hold across the normal at a geometry, for the whole stiffness, with the history of a
-// memory and these spheres.
+// What contacts pass on of what the model would hold across the normal at a geometry, for the whole
+// stiffness, with the history of a memory and these spheres: what pushes. Of a model that doesn't tell, a
+// spring's.
 double ContactStages::model_energy(int a, int b, const double* memory, const SphereCurvatures& spheres,
                                    const ContactGeometry& g) const {
   ModelMemory own;
@@ -129,7 +130,8 @@ double ContactStages::model_energy(int a, int b, const double* memory, const Sph
   c.moves_on = false;
   c.history = history;
   step_.model->force(c);
-  return std::isfinite(c.normal_energy) ? c.normal_energy : 0;
+  return std::isfinite(c.elastic_energy) && c.elastic_energy > 0 ? c.elastic_energy
+                                                                 : 0.5 * g.overlap * g.overlap;
 }
 
 // Spheres that a contact remembers, and whether it does.

@@ -191,7 +191,8 @@ void SurfaceWall::find_for(int body, const ContactStages::Step& step,
     r.point_a = r.point_b - c.gap * c.normal;
     motion_at(c, r.point_a, body, meshes, &f);
   }
-  stages->give(body, head, found_, contacts_.count, kind_ == Kind::mesh && edged(*particle.shape));
+  const bool mesh = kind_ == Kind::mesh, cylinder = kind_ == Kind::cylinder;
+  stages->give(body, head, found_, contacts_.count, cylinder || (mesh && edged(*particle.shape)), mesh);
 }
 
 // What a body keeps of a tube from step to step, if it does.

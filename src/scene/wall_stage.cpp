@@ -36,7 +36,7 @@ std::int32_t ContactStages::adopt_listed(std::int32_t number) {
   Partner& p = partner(number);
   p = Partner{};
   for (int k = 0; k < 9; k += 4) p.record.turn[k] = 1;
-  p.record.radius = p.record.inner = kFarAway;
+  p.record.radius = kFarAway;
   bind_listed(number, 0);
   return number;
 }
@@ -181,9 +181,9 @@ int ContactStages::list_former(int body, std::int32_t head, Former* former) {
 // Which former contact each of those found goes on with: on the same piece of the wall, then nearest first.
 // `number` of those that go on with none stays 0.
 void ContactStages::pair_up(int body, Former* former, int formers, const WallContact* found, int count,
-                            bool balanced, std::int32_t* number) const {
+                            bool pieces, std::int32_t* number) const {
   const auto alike = [](const Former& f, const WallContact& w) { return f.subtracts == (w.weight < 0); };
-  for (int k = 0; k < count && balanced; ++k)
+  for (int k = 0; k < count && pieces; ++k)
     for (int i = 0; i < formers && number[k] == 0; ++i) {
       if (former[i].taken || !alike(former[i], found[k])) continue;
       if ((former[i].flat && !found[k].region) || !same_piece(former[i].number, body, found[k])) continue;
@@ -197,7 +197,7 @@ void ContactStages::pair_up(int body, Former* former, int formers, const WallCon
       for (int k = 0; k < count && !former[i].taken; ++k) {
         if (number[k] != 0 || !alike(former[i], found[k])) continue;
         if (former[i].normal.dot(found[k].result.normal) < kSameSide) continue;
-        if (balanced && former[i].flat) continue;  // a polygon stands on its plane
+        if (pieces && former[i].flat) continue;  // a polygon stands on its plane
         const double d = (former[i].point - middle_of(found[k].result)).squaredNorm();
         if (d < least) least = d, best_former = i, best_found = k;
       }
@@ -207,12 +207,13 @@ void ContactStages::pair_up(int body, Former* former, int formers, const WallCon
   }
 }
 
-void ContactStages::give(int body, std::int32_t* head, WallContact* found, int count, bool balanced) {
+void ContactStages::give(int body, std::int32_t* head, WallContact* found, int count, bool balanced,
+                         bool pieces) {
   Former former[kMostListed];
   const int formers = list_former(body, *head, former);
   count = std::min(count, kMostListed);
   std::int32_t number[kMostListed] = {};
-  pair_up(body, former, formers, found, count, balanced, number);
+  pair_up(body, former, formers, found, count, balanced && pieces, number);
 
   double age = 0;
   for (int i = 0; i < formers; ++i) age = std::max(age, partner(former[i].number).age);
@@ -239,6 +240,7 @@ void ContactStages::give(int body, std::int32_t* head, WallContact* found, int c
   for (int k = 0; k < count; ++k) {
     const WallContact& f = found[k];
     const std::int32_t n = number[k];
+    partner(n).record.inner = pieces ? 0 : kFarAway;  // a mesh is as thick as paper
     update_listed(n, body, f, known[k]);
     if (!partner(n).follows) {
       if (!known[k] || !step_.setup) {

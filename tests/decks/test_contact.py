@@ -20,6 +20,16 @@ ATOMS = [(1, 1, 1, 0.03, 2500.0, 0.0, 0.0, 0.05, 0.8, 0.3, -0.5, 0.2),
 VELOCITIES = [(1, 0.1, 0.0, -0.3, 3.0, -2.0, 5.0), (2, 0.0, 0.0, -0.5, 0.0, 10.0, 0.0),
               (3, 0.0, 0.0, -0.6, 0.0, 0.0, 20.0)]
 BOX = ((-0.2, 0.2), (-0.2, 0.2), (-0.05, 0.4))
+FLOOR = """solid floor
+facet normal 0 0 1
+outer loop
+vertex -0.19 -0.19 0.2
+vertex 0.19 -0.19 0.2
+vertex 0 0.19 0.2
+endloop
+endfacet
+endsolid floor
+"""
 
 
 @functools.lru_cache(maxsize=None)
@@ -395,6 +405,19 @@ dump p all local 100 pgl.dump c_pgl[7] c_pgl[8] c_pgl[10] c_pgl[11] c_pgl[12] c_
             self.assertEqual(bool(frame["z"][0] > frame["z"][1]), told)
             warned = self.warnings(run, "Pair gran/nurbs: in the run bodies overlapped by as much as")
             self.assertEqual(len(warned), int(told))
+
+    def test_thin_bodies_that_go_through_a_mesh_are_told_of(self):
+        """A plate on its face: back from a floor of triangles, or through it."""
+        plate = deck.box_shape(1, 1, 0.03)
+        for speed, told in ((0.2, False), (20, True)):
+            atoms, speeds = [(1, 1, 1, 0.05, 2500.0, 0.0, 0.0, 0.205, 1.0, 0.0, 0.0, 0.0)], [(1, 0.0, 0.0, -speed, 0.0, 0.0, 0.0)]
+            start = START.replace("pair_style", "fix m all mesh/surface file floor.stl type 1\npair_style")
+            text = scene(start=start, extra="dump_modify d every 50", run=f"run {round(1000 / speed)}")
+            text = text.replace("plane 0 0 0 0 0 2.5", "mesh m")
+            run = deck.run_ok(text, files={**files(), "ell.json": plate, "floor.stl": FLOOR,
+                                           "bodies.data": deck.data_file(atoms, speeds, BOX, types=2)})
+            self.assertEqual(bool(run.dump("out.dump")[-1][1]["z"][0] < 0.2), told)
+            self.assertEqual(len(self.warnings(run, "Fix wall/nurbs w: in the run bodies overlapped by as much as")), int(told))
 
     def test_shallow_contacts_are_not_warned_of(self):
         self.assertFalse(self.warnings(deck.run_ok(scene(run="run 4321\nrun 1"), files=files()), "in the run"))

@@ -368,9 +368,14 @@ class Energy(unittest.TestCase):
                 Body(1, tuple(-x), tuple(-c for c in v),
                      (0.6863744121746117, -0.5937058006271023, -0.41280502216662807, -0.07743127460979443),
                      (-0.7213232, 0.0197925, 0.6675686))]
+        # A line rolls on to a face, and corners of a solid with all but sharp edges come down flat.
+        tube = (0.7672737470740928, -0.6407971289679256, 0.0016817175517496782, -0.025830377144379926)
+        roller = Body(1, (0, 0, 0.0114619), (0, 0, -0.2), tube, (2.1424022, 0.6566409, -0.3922096))
+        round_box = deck.shape_file("rounded-box", 1, 0.8, 0.6, rounding=0.5)
         for name, bodies, shape, floor, most in (("one", [one], rounded, True, 2e-3), ("several", several, rounded, True, 5e-4),
                                                  ("pair", pair, deck.box_shape(1, 0.8, 0.6), False, 5e-4),
-                                                 ("leaning pair", lean, rounded, False, 2e-3)):
+                                                 ("leaning pair", lean, rounded, False, 2e-3),
+                                                 ("roller", [roller], round_box, True, 5e-3)):
             for words in ("hertz tangential no_history", "hooke tangential no_history"):
                 with self.subTest(name, words=words):
                     t = run_bodies(bodies, [shape], words, floor=floor, dt=1.3e-5, steps=20000, every=200).thermo
@@ -380,6 +385,38 @@ class Energy(unittest.TestCase):
                     self.assertEqual(t["held[1]"][-1], 0)
                     self.assertLess(abs(kinetic[-1] / kinetic[0] - 1), most)
                     self.assertLess(np.abs(total / total[0] - 1).max(), 5 * most)
+
+    def test_elastic_collisions_in_a_cylinder_keep_it(self):
+        """A second place comes into contact at finite overlap: a tablet gained 30 %."""
+        tablet = deck.shape_file("tablet", 1, height=0.8, rim=0.15)
+        body = Body(1, (0, 0, 0), (-0.196445, 0, 0.0375402),
+                    (0.7672737470740928, -0.6407971289679256, 0.0016817175517496782, -0.025830377144379926),
+                    (2.2573866, 0.6918823, -0.4132595))
+        for words in ("hertz tangential no_history", "hooke tangential no_history"):
+            t = run_bodies([body], [tablet], words, dt=1e-5, steps=20000, every=200,
+                           commands=f"fix tube all wall/nurbs cylinder y 0.031 0 0 type 1 model {words}").thermo
+            total = t["KinEng"] + t["spin"] + t["held[1]"]
+            self.assertGreater(t["held[1]"].max(), 0.1 * total[0])
+            self.assertLess(np.abs(total / total[0] - 1).max(), 1e-2)
+
+    def test_models_that_tell_no_energy_bounce_no_higher(self):
+        """Their polygons held nothing, and let bodies sink in to half their size."""
+        body = Body(1, (0, 0, 0.0145), (0, 0, -0.2),
+                    (0.6387894387525346, -0.5036351531781682, -0.37408862207939836, 0.44537331335876224),
+                    (-1.8914342, -0.8639885, 0.4484429))
+        for name, rounding in (("sharp", 0), ("rounded", 0.05)):
+            shape = deck.shape_file("rounded-box", 1, 0.8, 0.6, rounding=rounding) if rounding else deck.box_shape(1, 0.8, 0.6)
+            for words in ("luding tangential no_history", "hooke/hysteresis tangential no_history"):
+                with self.subTest(name, words=words):
+                    values = {**models.MATERIALS, "youngsModulus": 5e6, "poissonsRatio": 0.3, "coefficientYieldRatio": 0.02,
+                              "coefficientFriction": 0.0, "coefficientRestitution": 0.9, "LoadingStiffness": 7000,
+                              "coefficientAdhesionStiffness": 0.0, "surfaceEnergy": 0.0, "pullOffForce": 0.0}
+                    run = run_bodies([body], [shape], words, values, floor=True, gravity=9.81, dt=1e-5, steps=30000, every=100)
+                    kinetic = run.thermo["KinEng"] + run.thermo["spin"]
+                    height = np.array([frame["z"][0] for _, frame in run.frames])
+                    self.assertLess(kinetic.max(), 5 * kinetic[0])
+                    self.assertLess(height.max(), 0.018)
+                    self.assertGreater(height.min(), 0.005)
 
     def test_ledger_closes_with_everything_on(self):
         """Damping, friction, rolling: the error of the sum falls with the square of the time step."""
