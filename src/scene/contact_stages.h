@@ -354,17 +354,18 @@ class ContactStages {
   bool serve_flat(ContactBlock& block, int lane, LeftPolygon* left);
   bool remake(ContactBlock& block, int lane, FlatContact& flat, PolygonState& state, double overlap);
   double kept_energy(const FlatContact& flat, const PolygonState& state, const ContactPolygon& polygon,
-                     const PolygonState& fresh, int a, int b, const double* const* memory,
+                     const PolygonState& fresh, int a, int b, const PointMemories& memory,
                      double holds) const;
   void run_flat(ContactBlock& block, int lane, FlatContact& flat, const PolygonState& state);
   LeftPolygon leave_flat(ContactBlock& block, int lane, FlatContact& flat, const PolygonState& state,
                          double overlap);
   void settle_left(ContactBlock& block, int lane, Results& results, const LeftPolygon& left);
   double arrival(int a, int b, const Vec3& normal, const Vec3& arm_a, const Vec3& arm_b) const;
-  double energy_of(const FlatContact& flat, const PolygonState& state, int a, int b) const;
+  double energy_of(const ContactPolygon& polygon, const PolygonState& state, int a, int b,
+                   const PointMemories& memory) const;
   void relax_polygon(const ContactBlock& block, int lane, const ContactRest& rest, FlatContact& flat,
                      PolygonState* state);
-  PolygonState give(ContactPolygon* polygon, int a, int b, double energy) const;
+  PolygonState give(ContactPolygon* polygon, int a, int b, double energy, const PointMemories& memory) const;
   void stand_off(ContactBlock& block, int lane, Results& results);
   void relax_single(ContactBlock& block, int lane, Results& results);
   void book(double energy, int a, int b);

@@ -92,8 +92,18 @@ double ContactStages::clear_way(int a, int b, double* until) const {
   return 0;
 }
 
-// The energy U / kn to a polygon, by its factor or its shift; its state then.
-PolygonState ContactStages::give(ContactPolygon* polygon, int a, int b, double energy) const {
+// What a polygon's points hold: by the linear law U / kn, else what the model says, each with the history of
+// a memory.
+double ContactStages::energy_of(const ContactPolygon& polygon, const PolygonState& state, int a, int b,
+                                const PointMemories& memory) const {
+  return step_.model != nullptr ? model_energy(polygon, state, a, b, memory.data())
+                                : stored_energy(polygon, state);
+}
+
+// That energy to a polygon, by its factor or its shift; its state then.
+PolygonState ContactStages::give(ContactPolygon* polygon, int a, int b, double energy,
+                                 const PointMemories& memory) const {
+  if (step_.model != nullptr) return give_model(polygon, a, b, energy, memory.data());
   const Vec3 wall = wall_frame(a);
   return give_energy(energy, kStiffest, placed(*step_.bodies, wall, a), placed(*step_.bodies, wall, b),
                      polygon);
@@ -169,23 +179,14 @@ bool ContactStages::make_flat(ContactBlock& block, int lane, const Results& sing
   if (!(state.energy > 0)) return false;
   const double weight = block.field[kWeight][lane];
   const ContactGeometry geometry = single.geometry(lane);
-  if (step_.model != nullptr) {
-    PointMemories memory;
-    memory.fill(pool_.memory(block, lane));
-    const double energy = weight * model_energy(block, lane, geometry);
-    if (a >= -1) {
-      state = give_model(&polygon, a, b, energy, memory.data());
-    } else {
-      const double full = model_energy(polygon, state, a, b, memory.data());
-      polygon.factor = energy > 0 && full > 0 ? energy / full : 1;
-    }
-  } else {
-    const double energy = 0.5 * weight * geometry.overlap * geometry.overlap;
-    if (a >= -1)
-      state = give(&polygon, a, b, energy);
-    else
-      polygon.factor = continuity_factor(energy, polygon, state);
-  }
+  const double energy = weight * (step_.model != nullptr ? model_energy(block, lane, geometry)
+                                                         : 0.5 * geometry.overlap * geometry.overlap);
+  PointMemories memory{};
+  if (step_.model != nullptr) memory.fill(pool_.memory(block, lane));
+  if (a >= -1)
+    state = give(&polygon, a, b, energy, memory);
+  else
+    polygon.factor = continuity_factor(energy, energy_of(polygon, state, a, b, memory));
   if (!(polygon.factor < kStiffest)) return false;
 
   ContactState old;
@@ -330,19 +331,14 @@ double ContactStages::arrival(int a, int b, const Vec3& normal, const Vec3& arm_
   return kArrival * step_.dt * std::max(0.0, -normal.dot(velocity));
 }
 
-// Of a polygon's points: by the linear law U / kn, else the model's.
-double ContactStages::energy_of(const FlatContact& flat, const PolygonState& state, int a, int b) const {
-  return step_.model != nullptr ? model_energy(flat.polygon, state, a, b, point_memories(flat).data())
-                                : stored_energy(flat.polygon, state);
-}
-
-// The part of it that goes to `polygon`, whose points would hold `holds`, and have the history of the
-// memories: springs keep their energy. An old line that rolled has left the place where it bore.
+// What of a polygon's energy goes to another one, which would hold `holds`: springs keep theirs. An old line
+// that rolled has left the place where it bore.
 double ContactStages::kept_energy(const FlatContact& flat, const PolygonState& state,
                                   const ContactPolygon& polygon, const PolygonState& fresh, int a, int b,
-                                  const double* const* memory, double holds) const {
+                                  const PointMemories& memory, double holds) const {
   const bool rolled = rolled_along(flat.polygon, polygon);
-  const double held = energy_of(flat, rolled ? after_rolling(flat.polygon, polygon, fresh) : state, a, b);
+  const double held = energy_of(flat.polygon, rolled ? after_rolling(flat.polygon, polygon, fresh) : state, a,
+                                b, point_memories(flat));
   const int deepest = static_cast<int>(std::min_element(fresh.gap, fresh.gap + fresh.count) - fresh.gap);
   const Vec3 &arm_a = fresh.arm_a[deepest], &arm_b = fresh.arm_b[deepest];
   const double way = arrival(a, b, state.normal, arm_a, arm_b);
@@ -373,17 +369,13 @@ bool ContactStages::remake(ContactBlock& block, int lane, FlatContact& flat, Pol
   PointMemories memory{};
   if (step_.model != nullptr)
     for (int k = 0; k < polygon.count; ++k) memory[k] = pool_.memory(flat.points, source[k]);
-  const double holds = step_.model != nullptr ? model_energy(polygon, fresh, a, b, memory.data())
-                                              : stored_energy(polygon, fresh);
+  const double holds = energy_of(polygon, fresh, a, b, memory);
   // What would make the springs too stiff they lose, which is booked.
-  const double kept = kept_energy(flat, state, polygon, fresh, a, b, memory.data(), holds);
-  if (a < -1) {
-    if (holds > 0)
-      polygon.factor = std::min(polygon.factor * kept / holds, std::max(kStiffest, polygon.factor));
-  } else {
-    fresh =
-        step_.model != nullptr ? give_model(&polygon, a, b, kept, memory.data()) : give(&polygon, a, b, kept);
-  }
+  const double kept = kept_energy(flat, state, polygon, fresh, a, b, memory, holds);
+  if (a >= -1)
+    fresh = give(&polygon, a, b, kept, memory);
+  else if (holds > 0)
+    polygon.factor = std::min(polygon.factor * kept / holds, std::max(kStiffest, polygon.factor));
   if (step_.model != nullptr) {
     remake_model(flat, polygon, source);
     state = fresh;
@@ -442,7 +434,7 @@ ContactStages::LeftPolygon ContactStages::leave_flat(ContactBlock& block, int la
   const int a = block.a[lane], b = block.b[lane];
   LeftPolygon left;
   left.any = true;
-  left.normal_energy = energy_of(flat, state, a, b);
+  left.normal_energy = energy_of(flat.polygon, state, a, b, point_memories(flat));
   if (step_.model != nullptr) {
     ContactState single{};
     leave_model(block, lane, flat, state, overlap, &single);

@@ -166,8 +166,10 @@ double ContactStages::model_energy(const ContactPolygon& polygon, const PolygonS
   return polygon.factor * sum;
 }
 
+// Nulls where no model serves.
 ContactStages::PointMemories ContactStages::point_memories(const FlatContact& flat) const {
-  PointMemories memory;
+  PointMemories memory{};
+  if (step_.model == nullptr) return memory;
   for (int k = 0; k < kContactPoints; ++k) memory[k] = pool_.memory(flat.points, k);
   return memory;
 }

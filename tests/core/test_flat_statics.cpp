@@ -109,7 +109,7 @@ struct Touch {
         spring[i] = fresh ? Vec3(Vec3::Zero()) : old[polygon.count > 0 ? source[i] : 0];
       // While it slides the jump is booked; a body that leans on other points keeps its force.
       const bool slides = polygon.count > 0 && state.slid > polygon.room;
-      next.factor = slides ? polygon.factor : continuity_factor(energy, next, now);
+      next.factor = slides ? polygon.factor : continuity_factor(energy, stored_energy(next, now));
       if (polygon.count > 0) booked += law.kn * (stored_energy(next, now) - energy);
       polygon = next;
       ++remakes;

@@ -170,10 +170,7 @@ PolygonState after_rolling(const ContactPolygon& old, const ContactPolygon& poly
   return rolled;
 }
 
-double continuity_factor(double energy, const ContactPolygon& polygon, const PolygonState& state) {
-  ContactPolygon unit = polygon;
-  unit.factor = 1;
-  const double full = stored_energy(unit, state);
+double continuity_factor(double energy, double full) {
   return energy > 0 && full > 0 ? energy / full : 1;
 }
 

@@ -179,8 +179,8 @@ bool rolled_along(const ContactPolygon& old, const ContactPolygon& polygon);
 // new one's.
 PolygonState after_rolling(const ContactPolygon& old, const ContactPolygon& polygon,
                            const PolygonState& state);
-// The factor that gives the polygon the energy U / kn; 1 where one of the two has none.
-double continuity_factor(double energy, const ContactPolygon& polygon, const PolygonState& state);
+// The factor that gives an energy to a polygon that holds `full` at factor 1; 1 where one of the two is none.
+double continuity_factor(double energy, double full);
 // Gives it that energy by its factor where it holds less, up to `stiffest` (or what it had), and where it
 // holds more by its shift, after what its factor had over 1. Returns the state then.
 PolygonState give_energy(double energy, double stiffest, const BodyFrame& a, const BodyFrame& b,
