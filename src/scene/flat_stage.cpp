@@ -339,6 +339,7 @@ double ContactStages::kept_energy(const FlatContact& flat, const PolygonState& s
   const bool rolled = rolled_along(flat.polygon, polygon);
   const double held = energy_of(flat.polygon, rolled ? after_rolling(flat.polygon, polygon, fresh) : state, a,
                                 b, point_memories(flat));
+  if (!(holds > held)) return held;
   const int deepest = static_cast<int>(std::min_element(fresh.gap, fresh.gap + fresh.count) - fresh.gap);
   const Vec3 &arm_a = fresh.arm_a[deepest], &arm_b = fresh.arm_b[deepest];
   const double way = arrival(a, b, state.normal, arm_a, arm_b);
@@ -346,7 +347,7 @@ double ContactStages::kept_energy(const FlatContact& flat, const PolygonState& s
                              ? model_energy(a, b, memory[deepest], inherited_spheres(memory[deepest], a, b),
                                             {way, fresh.normal, arm_a, arm_b})
                              : 0.5 * way * way;
-  return held + std::clamp(arrived, 0.0, std::max(0.0, holds - held));
+  return held + std::clamp(arrived, 0.0, holds - held);
 }
 
 // The polygon anew, after the points slid or the body tilted; histories go to the new points.

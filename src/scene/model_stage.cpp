@@ -221,8 +221,7 @@ void ContactStages::ask_model(ContactBlock& block, int lane, const ContactGeomet
   ContactState before{}, state{};
   if (step_.ledger) block.get(lane, kStateField, kContactStateSize, &before);
 
-  const bool known = own.curvature_a != 0 || own.curvature_b != 0;
-  if (!known) {
+  if (!knows_spheres(pool_.memory(block, lane))) {
     const SphereCurvatures k = model_curvatures(block, lane, g);
     own.curvature_a = k.a;
     own.curvature_b = k.b;
