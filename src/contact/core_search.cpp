@@ -94,9 +94,7 @@ class CoreDistance {
 
 bool solve_cores(const PairFrame& pair, double tolerance, const Particle& a, const Particle& b,
                  const ContactSettings& settings, PairMemory& memory, ContactResult* r) {
-  if (!PairFrame::is_swept(*pair.a, pair.scale_a, tolerance) ||
-      !PairFrame::is_swept(*pair.b, pair.scale_b, tolerance))
-    return give_up(kCorePair, &memory);
+  if (!pair.both_swept(tolerance)) return give_up(kCorePair, &memory);
   const double radius_a = pair.scale_a * pair.a->core.radius, radius_b = pair.scale_b * pair.b->core.radius,
                radii = radius_a + radius_b;
   if (!(radii > 0)) return give_up(kCorePair, &memory);

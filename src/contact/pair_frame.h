@@ -39,6 +39,10 @@ struct PairFrame {
   static bool is_swept(const Shape& shape, double scale, double tolerance) {
     return shape.core.found() && scale * shape.core.error <= kCoreError * tolerance;
   }
+  // For both: then they are points all but balls.
+  bool both_swept(double tolerance) const {
+    return is_swept(*a, scale_a, tolerance) && is_swept(*b, scale_b, tolerance);
+  }
   // Radius of a ball that rolls inside. None that does is larger than the largest inside (a sphere's radii
   // are bounds of it).
   static double rolling_ball(const Shape& shape, double scale, double tolerance) {

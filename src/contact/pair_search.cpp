@@ -249,7 +249,7 @@ class Ladder {
   // Where both bodies are a few points it costs less than the first; where the overlap is deep Newton proves
   // one in a hundred of what is scanned.
   ContactResult cold(const PairFrame& pair, double tolerance, int spent) {
-    if (of_points(pair, tolerance)) return fallback(pair, nullptr, pair.offset, tolerance, spent);
+    if (pair.both_swept(tolerance)) return fallback(pair, nullptr, pair.offset, tolerance, spent);
     JointSolution best;
     bool have = false;
     ContactResult answer;
@@ -286,11 +286,6 @@ class Ladder {
     if (meet_flat(pair, seed, tolerance, &flat))
       return finish(pair, flat, flat.normal, Rung::cold, flat.iterations);
     return fallback(pair, have ? &best : nullptr, seed, tolerance, spent);
-  }
-
-  static bool of_points(const PairFrame& pair, double tolerance) {
-    return PairFrame::is_swept(*pair.a, pair.scale_a, tolerance) &&
-           PairFrame::is_swept(*pair.b, pair.scale_b, tolerance);
   }
 
   static const DirectionGuess& lowest_of(const DirectionGuess* guesses, int count) {
@@ -368,7 +363,7 @@ class Ladder {
       if (again.bracket.width() < hull.bracket.width()) hull = again;
     }
     if (faces && is_open() && proves()) return as_deep();
-    if (hull.converged && (hull.closed || of_points(pair, tolerance))) {
+    if (hull.converged && (hull.closed || pair.both_swept(tolerance))) {
       locate(pair, &hull.points);
       return finish(pair, hull, hull.bracket.direction, Rung::fallback, spent);
     }

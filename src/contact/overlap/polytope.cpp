@@ -91,13 +91,10 @@ PolytopeResult solve_polytope(const PairFrame& pair, const Vec3& seed, double to
     return best;
   upper = std::min(upper, gap_of_inner_balls(pair));
   // Where parts of the bodies are parts of balls, those tell more; points that balls roll about, too.
-  const auto is_swept = [&](const Shape& shape, double scale) {
-    return PairFrame::is_swept(shape, scale, tolerance);
-  };
   const bool near = are_near_balls(pair),
              near_first = near && pair.offset.norm() < kOneCentre * pair.inner_radii() &&
                           !pair.a->inner_balls.found() && !pair.b->inner_balls.found() &&
-                          !(is_swept(*pair.a, pair.scale_a) && is_swept(*pair.b, pair.scale_b));
+                          !pair.both_swept(tolerance);
   const auto among_balls = [&]() -> const PolytopeResult& {
     if (!*balls) search_near_balls(pair, tolerance, &balls->emplace());
     return **balls;

@@ -7,7 +7,6 @@
 namespace nurbs {
 namespace {
 
-constexpr double kPlaneBeyond = 4;     // times the least distance, squared: no triangle in it is nearer
 constexpr double kFacingBetter = 0.1;  // of kFacing, that better witnesses are to be off
 constexpr int kMostFacing = 96;        // points spent on better ones
 constexpr double kTilt = 1e-6;         // rad: what a support moves by tells faces from points
@@ -60,7 +59,8 @@ bool PolytopeSearch::find_points(PolytopeResult* r) {
   direction_ = r->bracket.direction;
   if (!start(direction_)) return false;
   Vec3 a, b;
-  refine_pair(&a, &b);
+  FaceDistances distances;
+  refine_pair(&distances, &a, &b);
   const int spent = r->iterations;
   *r = with_points(a, b);
   r->iterations += spent;
@@ -91,7 +91,7 @@ PolytopeResult PolytopeSearch::with_points(const Vec3& a, const Vec3& b) const {
 // inside, its foot on the supporting plane. (Of a flat of the obstacle, which is several triangles, or of
 // two equal minima other points would not face each other.)
 Vec3 PolytopeSearch::target() const {
-  return std::min(0.0, lower_ + shrink_) * -direction_;
+  return -(lower_ + shrink_) * direction_;
 }
 
 // Points of the bodies that are as nearly so as the supports along direction_ or one of the hull's
@@ -99,54 +99,45 @@ Vec3 PolytopeSearch::target() const {
 // there belongs to neither body: where the supports do not face each other, as on ruled lines, it is made
 // again without; and a hull that closed with its first points, on faces, is made finer.
 void PolytopeSearch::find_witness(Vec3* a, Vec3* b) {
-  if (find_nearest_pair(a, b).off <= kFacing * pair_.size) return;
+  FaceDistances distances;
+  if (find_nearest_pair(&distances, a, b).off <= kFacing * pair_.size) return;
   if (caps_ > 0) {
     drop_caps();
     Vec3 across;
     if (!start_from_points(0, &across)) return;
+    distances.forget();
   }
-  refine_pair(a, b);
+  refine_pair(&distances, a, b);
 }
 
-void PolytopeSearch::refine_pair(Vec3* a, Vec3* b) {
+void PolytopeSearch::refine_pair(FaceDistances* distances, Vec3* a, Vec3* b) {
   for (int k = 0; k < kMostFacing; ++k) {
-    const Facing near = find_nearest_pair(a, b);
+    const Facing near = find_nearest_pair(distances, a, b);
     if (near.off <= std::max(kFacingBetter * kFacing * pair_.size, roundoff()) || near.face < 0) return;
     const int v = query(near.towards.normalized(), closest_of(hull_.face(near.face), direction_));
     if (v < 0 || hull_.grow(v, 0.0, near.face) != GrowingHull::Growth::grown) return;
   }
 }
 
-PolytopeSearch::Facing PolytopeSearch::find_nearest_pair(Vec3* a, Vec3* b) const {
+PolytopeSearch::Facing PolytopeSearch::find_nearest_pair(FaceDistances* distances, Vec3* a, Vec3* b) const {
   const Vec3 target = this->target();
   *a = witness_[best_].a;
   *b = witness_[best_].b;
   Facing near{(*a - *b - target).norm()};
-  double best = kFarAway;
-  Vec3 weights;
-  for (int k = 0; k < hull_.faces(); ++k) {
-    const GrowingHull::Face& f = hull_.face(k);
-    if (!f.alive) continue;
-    const double above = f.normal.dot(target) - f.offset;  // 0 of slivers
-    if (above * above > kPlaneBeyond * best) continue;
-    if (std::any_of(f.vertex.begin(), f.vertex.end(), [&](short v) { return witness_[v].cap; })) continue;
-    const Vec3 &p = hull_.point(f.vertex[0]), &q = hull_.point(f.vertex[1]), &r = hull_.point(f.vertex[2]);
-    const Vec3 w = nearest_on_triangle(p - target, q - target, r - target);
-    const Vec3 towards = target - (w[0] * p + w[1] * q + w[2] * r);
-    const double distance = towards.squaredNorm();
-    if (!(distance < best)) continue;
-    best = distance;
-    near.face = k;
-    near.towards = towards;
-    weights = w;
-  }
-  if (near.face < 0 || !(std::sqrt(best) < near.off)) return near;
-  near.off = std::sqrt(best);
+  const auto is_cap = [&](short v) { return witness_[v].cap; };
+  const auto [face, distance2] = distances->nearest(hull_, target, is_cap);
+  if (face < 0) return near;
+  const std::array<short, 3>& vertex = hull_.face(face).vertex;
+  const Vec3 &p = hull_.point(vertex[0]), &q = hull_.point(vertex[1]), &r = hull_.point(vertex[2]);
+  const Vec3 w = nearest_on_triangle(p - target, q - target, r - target);
+  near.face = face;
+  near.towards = target - (w[0] * p + w[1] * q + w[2] * r);
+  if (!(std::sqrt(distance2) < near.off)) return near;
+  near.off = std::sqrt(distance2);
   *a = *b = Vec3::Zero();
   for (int i = 0; i < 3; ++i) {
-    const Witness& w = witness_[hull_.face(near.face).vertex[i]];
-    *a += weights[i] * w.a;
-    *b += weights[i] * w.b;
+    *a += w[i] * witness_[vertex[i]].a;
+    *b += w[i] * witness_[vertex[i]].b;
   }
   return near;
 }

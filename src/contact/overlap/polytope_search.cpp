@@ -50,8 +50,7 @@ PolytopeSearch::PolytopeSearch(const PairFrame& pair, double tolerance, double j
   shrink_a_ = ball_a.radius;
   shrink_b_ = ball_b.radius;
   rise_ = ball_a.rise + ball_b.rise;
-  points_ = points && PairFrame::is_swept(*pair.a, pair.scale_a, tolerance) &&
-            PairFrame::is_swept(*pair.b, pair.scale_b, tolerance);
+  points_ = points && pair.both_swept(tolerance);
   if (points_) {
     // The hull is their points' difference's, as exact as they are.
     shrink_a_ = pair.scale_a * pair.a->core.radius;

@@ -6,6 +6,7 @@
 #include <array>
 
 #include "body/hull_point.h"
+#include "contact/overlap/face_distances.h"
 #include "contact/overlap/growing_hull.h"
 #include "contact/overlap/polytope.h"
 #include "contact/overlap/turn_bound.h"
@@ -136,8 +137,8 @@ class PolytopeSearch {
   PolytopeResult with_points(const Vec3& a, const Vec3& b) const;
   Vec3 target() const;
   void find_witness(Vec3* a, Vec3* b);
-  void refine_pair(Vec3* a, Vec3* b);
-  Facing find_nearest_pair(Vec3* a, Vec3* b) const;
+  void refine_pair(FaceDistances* distances, Vec3* a, Vec3* b);
+  Facing find_nearest_pair(FaceDistances* distances, Vec3* a, Vec3* b) const;
 
   static constexpr int kBeforeCores = 96;  // points before a cap by cores is tried
 

@@ -33,9 +33,7 @@ Segment segment_of(const SpheroPolyhedron& core, double scale, const Mat3& turn,
 }  // namespace
 
 bool search_segments(const PairFrame& pair, double tolerance, PolytopeResult* result) {
-  if (!PairFrame::is_swept(*pair.a, pair.scale_a, tolerance) ||
-      !PairFrame::is_swept(*pair.b, pair.scale_b, tolerance))
-    return false;
+  if (!pair.both_swept(tolerance)) return false;
   const SpheroPolyhedron &core_a = pair.a->core, &core_b = pair.b->core;
   if (core_a.points.size() > 2 || core_b.points.size() > 2) return false;
   const Segment a = segment_of(core_a, pair.scale_a, Mat3::Identity(), Vec3::Zero()),
