@@ -130,9 +130,11 @@ RegionContact make_region_polygon(const Particle& particle, const PlaneRegion& r
 // A, except that a face lying inside the other is incident. The incident face is clipped by the reference's
 // outline; if its clipped points are not all within reach, a crease, then a ruled line of the incident body,
 // is clipped instead. Without a face, two parallel lines give the segment they share, with A's line in the
-// reference plane. Crossing edges, and corners on faces, are single points: false, count = 0. 1.5 us
-// for two boxes, 15 to 30 us for discs and rounded boxes, of which support searches from cold starts are the
-// most. `starts`: surface points of A and B near the contact, where searches begin; may be null.
+// reference plane, across which the bodies overlap least. Round sides whose lines cross share one while it
+// would lack a hundredth of the overlap at most where they lie beside each other. Crossing edges, and corners
+// on faces, are single points: false, count = 0. 1.5 us for two boxes, 15 to 30 us for discs and rounded
+// boxes, of which support searches from cold starts are the most. `starts`: surface points of A and B near
+// the contact, where searches begin; may be null.
 bool make_pair_polygon(const Particle& a, const Particle& b, const Vec3& normal, double overlap, double reach,
                        const ContactPolygon* old, ContactPolygon* out, double* clear = nullptr,
                        const SurfacePoint* starts = nullptr);

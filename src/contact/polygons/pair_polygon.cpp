@@ -1,6 +1,7 @@
 // Polygons of two bodies: a face of one clips what the other has opposite, or two lines share a segment.
 #include <cmath>
 
+#include "body/local_form.h"
 #include "contact/polygons/polygon_points.h"
 
 namespace nurbs {
@@ -15,7 +16,8 @@ constexpr double kLineAngle = 0.8;        // rad, the same for the normal of a r
 constexpr double kSameWay = 0.99, kOtherWay = 1.1;
 // Of the deepest place over a face, that a new and an old polygon on it must have at least.
 constexpr double kNewDepth = 0.5, kKeptDepth = 0.25;
-constexpr double kPairShare = 0.5;   // as kWayShare, where the overlap's growth counts by itself
+constexpr double kPairShare = 0.5;  // as kWayShare, where the overlap's growth counts by itself
+constexpr double kBeside = 0.01, kKeptBeside = 0.02;  // of the overlap, that lines beside each other may lack
 constexpr double kMostAcross = 0.1;  // rad: one step of the search for the least overlap across lines
 constexpr int kAcrossSteps = 12;     // of them; 2 to 3 are usual
 
@@ -346,6 +348,7 @@ struct Line {
   Vec3 ends[2];  // lab, from A's centre of mass
   int vertex[2];
   bool ruled;
+  SurfacePoint where;  // the support it was found by
 };
 
 // A crease or ruled line that supports the body in lab direction d, to `tolerance`. `room`, where there is
@@ -369,7 +372,18 @@ bool support_line(const Body& body, const Vec3& d, double tolerance, double smal
     line->vertex[i] = set.vertex[i];
   }
   line->ruled = set.ruled;
+  line->where = set.where;
   return true;
+}
+
+// Of a body's side across a line of it, lab; 0 of a crease.
+double radius_across(const Body& body, const Line& line, const Vec3& across) {
+  if (!line.ruled) return 0;
+  if (!has_patch(*body.shape, line.where)) return body.radius();
+  const BezierPatch& patch = body.shape->patches[line.where.patch];
+  const double bend =
+      normal_curvature(local_form(patch, line.where.u, line.where.v), body.turned_back(across));
+  return bend > 0 ? body.frame.scale / bend : kInfinity;
 }
 
 // Two lines: the reference plane goes through A's, as square to the contact's normal as it can.
@@ -445,18 +459,26 @@ bool line_contact(const Body& a, const Body& b, Vec3 d, double overlap, double r
   const double smaller = std::min(a.radius(), b.radius());
   Line on_a, on_b;
   if (!support_line(a, d, reach, smaller, &on_a, room)) return false;
-  if (rolls) {
+  const auto to_least = [&] {
     d = least_across(a, b, (on_a.ends[1] - on_a.ends[0]).normalized(), d);
-    if (!support_line(a, d, reach, smaller, &on_a, room)) return false;
-  }
+    return support_line(a, d, reach, smaller, &on_a, room);
+  };
+  if (rolls && !to_least()) return false;
   if (!support_line(b, -d, reach, smaller, &on_b, room)) return false;
+  if (!rolls && (on_a.ruled || on_b.ruled) &&
+      (!to_least() || !support_line(b, -d, reach, smaller, &on_b, room)))
+    return false;
   const LinePair lines = pair_of(on_a, on_b, d);
   const ReferencePlane& plane = lines.plane;
   const double length = lines.length;
   const Vec2 &p = lines.p, &q = lines.q;
-  // Lines further apart sideways than this touch at one point.
-  if (lines.aside() > reach) {
-    *room = 0.5 * (lines.aside() - reach);
+  // Lines further apart sideways than this touch at one point. Where they are, round sides overlap by less:
+  // s apart by s^2 / 2 (R_A + R_B).
+  const double round = radius_across(a, on_a, plane.v) + radius_across(b, on_b, plane.v),
+               lost = (rolls ? kKeptBeside : kBeside) * overlap,
+               most = round > 0 ? std::min(reach, std::sqrt(2 * round * lost)) : reach;
+  if (lines.aside() > most) {
+    *room = 0.5 * (lines.aside() - most);
     return false;
   }
   Candidates points;
