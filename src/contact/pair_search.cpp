@@ -393,6 +393,11 @@ class Ladder {
       locate(pair, &hull.points);
     }
     hull.converged = hull.converged || hull.bracket.width() <= tolerance;
+    if (is_open()) {
+      deep = joint;
+      if (!joint.stationary) deep.iterations = 0;
+      if (search_deep(pair, tolerance, &deep, nullptr, DeepEffort::last) && deep.converged) return as_deep();
+    }
     return finish(pair, hull, hull.bracket.direction, Rung::fallback, spent);
   }
 

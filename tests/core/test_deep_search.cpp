@@ -331,6 +331,36 @@ TEST(DeepSearch, a_local_minimum_is_not_taken_for_the_least) {
   EXPECT_GT(found, 5);
 }
 
+// Twins of nearly round bodies whose joints open by 0.2 degrees, about one centre, quarter turns apart: p has
+// several minima nearly as low as each other, in valleys next to creases, where no ball rolls.
+TEST(DeepSearch, kinked_twins_about_one_centre) {
+  Random random(83);
+  int last = 0;
+  for (const Vec3& axes : {Vec3(1, 0.99, 0.92), Vec3(1, 0.9, 0.85)}) {
+    const ShapePointer shape = make_shape("kinked", fitted_ellipsoid(axes, 1));
+    for (int k = 0; k < 3; ++k)
+      for (const double off : {0.0, 1e-6}) {
+        Pair p;
+        p.a.shape = p.b.shape = shape.get();
+        p.b.q = Quat(Eigen::AngleAxisd(M_PI / 2, Vec3::Unit(k)));
+        p.b.x = off * random.direction();
+        const PairFrame pair = mapped(p);
+        JointSolution s;
+        s.iterations = 0;
+        last += !search_deep(pair, 1e-9 * pair.size, &s);
+        double memory[kPairMemorySize] = {0};
+        const ContactResult r = find_contact(p.a, p.b, ContactSettings(), memory);
+        ASSERT_EQ(r.status, Status::converged) << axes.transpose() << " axis " << k << " off " << off;
+        for (int i = 0; i < 3000; ++i)
+          ASSERT_GE(overlap_along(p.a, p.b, random.direction()), -r.upper - 1e-13);
+        for (int i = 0; i < 3000; ++i)
+          ASSERT_GE(overlap_along(p.a, p.b, near(r.normal, random.log_uniform(1e-5, 0.5), random)),
+                    -r.upper - 1e-13);
+      }
+  }
+  EXPECT_GT(last, 5);
+}
+
 // At d two bodies bend far more one way than the other, both the same way, and p has a saddle with two lower
 // minima beside it. Bends are summed in one frame: crossed by mistake they would make it a minimum.
 TEST(DeepSearch, a_saddle_is_not_taken_for_a_minimum) {

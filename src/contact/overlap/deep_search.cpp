@@ -14,16 +14,20 @@
 namespace nurbs {
 namespace {
 
-constexpr int kFirstDepth = 2;   // 96 cells
-constexpr int kNewtonDepth = 5;  // at which a cell that stays is looked into, and every other one below
-constexpr int kDeepest = 9;
-constexpr int kSupportDepth = 6;  // from which supports are evaluated
-constexpr int kMostSupports = 28;
+constexpr int kFirstDepth = 2;      // 96 cells
+constexpr int kNewtonDepth = 5;     // at which a cell that stays is looked into, and every other one below
+constexpr int kSupportDepth = 6;    // from which supports are evaluated
 constexpr int kBeforeWidening = 4;  // supports before a cap is widened, and between that and the next
-constexpr int kMostWidening = 100;  // points spent on that
-constexpr int kMostDirectionCells = 800;
-constexpr int kMostNewtons = 12;
-constexpr int kMostCaps = 8;
+
+// What may be spent.
+struct Limits {
+  int cells, deepest;      // halvings of a cell
+  int supports, widening;  // points that caps are widened by
+  int newtons, caps;
+  bool capless;        // cells may do where the least minimum has no cap ...
+  double of_supports;  // ... and then supports have to be right to this share of what they usually are
+};
+constexpr Limits kUsual{800, 9, 28, 100, 12, 8, false, 1}, kLast{60000, 20, 15000, 2000, 64, 32, true, 0.1};
 constexpr int kStretches = static_cast<int>(kStretchCaps.size()), kCaps = static_cast<int>(kInnerCaps.size());
 constexpr double kLeastCap = 0.012;  // rad: about the best minimum; less would leave thousands of cells
 constexpr std::array<double, 2> kWidened = {0.21, 0.42};  // rad, that caps are widened to in turn
@@ -70,15 +74,17 @@ struct Reach {
 
 // One number: written as four and read as one, the stack of cells would wait for itself.
 struct DirectionCell {
-  std::uint32_t code;
+  std::uint64_t code;
   DirectionCell() = default;
   DirectionCell(int face, int depth, int i, int j)
-      : code(static_cast<std::uint32_t>(face << 28 | depth << 24 | i << 12 | j)) {}
-  int face() const { return code >> 28; }
-  int depth() const { return code >> 24 & 15; }
-  int i() const { return code >> 12 & 4095; }
-  int j() const { return code & 4095; }
+      : code(static_cast<std::uint64_t>(face << 8 | depth) << 48 | static_cast<std::uint64_t>(i) << 24 |
+             static_cast<std::uint64_t>(j)) {}
+  int face() const { return static_cast<int>(code >> 56); }
+  int depth() const { return code >> 48 & 255; }
+  int i() const { return code >> 24 & 0xffffff; }
+  int j() const { return code & 0xffffff; }
 };
+static_assert(kLast.deepest <= 24, "what a cell's number holds");
 
 // The four corners and the middle of a cell, as D = +-axis + a * next axis + b * the one after.
 struct Corners {
@@ -115,8 +121,9 @@ struct Corners {
 
 class DeepSearch {
  public:
-  DeepSearch(const PairFrame& pair, double tolerance)
+  DeepSearch(const PairFrame& pair, double tolerance, const Limits& limits)
       : pair_(pair),
+        limits_(limits),
         inner_a_(pair.a->lazy_inner_map.known()),
         inner_b_(pair.b->lazy_inner_map.known()),
         tolerance_(tolerance),
@@ -210,10 +217,16 @@ class DeepSearch {
 
   // The same from the supports along the cell's middle, for cells so small that the nodes are far off.
   bool excluded_by_supports(const DirectionCell& cell, const Corners& corners) {
-    if (++supports_ > kMostSupports) return false;
+    if (++supports_ > limits_.supports) return false;
     const Vec3 middle = corners.middle(), d = middle.normalized(), on_b = pair_.direction_on_b(d);
     const Radii r = radii(nearest(inner_a_, d), nearest(inner_b_, on_b), cap_of_depth(cell.depth()));
-    const auto [a, b] = hull_supports(pair_, d, nullptr, nullptr, tolerance_);
+    const auto [a, b] = hull_supports(pair_, d, nullptr, nullptr, limits_.of_supports * tolerance_);
+    if (limits_.capless && newtons_ < limits_.newtons &&
+        pair_.overlap_along(d, a.upper, b.upper) < threshold_) {
+      // Where minima lie closer together than searches begin.
+      looked_[newtons_++] = d;
+      if (!go_from(a.where, b.where)) supports_ = limits_.supports;
+    }
     const Vec3 g =
         pair_.place_a(a.point) - r.a * a.normal - pair_.place_b(b.point) + r.b * (pair_.turn * b.normal);
     return corners.above(g, r.level + noise_);
@@ -222,7 +235,7 @@ class DeepSearch {
   // Newton from where the atlases have the supports along a direction (of any length). False where the search
   // can't go on.
   bool look(const Vec3& d) {
-    if (newtons_ == kMostNewtons) return false;
+    if (newtons_ == limits_.newtons) return false;
     looked_[newtons_++] = d.normalized();
     const Shape &a = *pair_.a, &b = *pair_.b;
     return go_from(a.atlas.place(d), b.atlas.place(pair_.direction_on_b(d)));
@@ -287,8 +300,8 @@ class DeepSearch {
         kept_ = grown;
       }
     }
-    if (grown.angle < kLeastCap) return !lowest;
-    if (caps_ == kMostCaps) return false;
+    if (grown.angle < kLeastCap) return !lowest || limits_.capless;
+    if (caps_ == limits_.caps) return false;
     cap.cosine = std::cos(grown.angle);
     cap_[caps_++] = cap;
     return true;
@@ -313,12 +326,13 @@ class DeepSearch {
       balls[k] = {pair_.scale_a * a.radius[k], pair_.scale_b * b.radius[k], kInnerCaps[k] - off};
     for (int k = 0; k <= kCaps; ++k)
       if (balls[k].valid >= wanted || balls[k + 1].sum() <= kAsLarge * balls[k].sum())
-        proven = widen_cap(pair_, minimum, balls[k], proven, wanted, kMostWidening, &widening_);
+        proven = widen_cap(pair_, minimum, balls[k], proven, wanted, limits_.widening, &widening_);
     return proven;
   }
 
   // The cap nearest to a direction; whether it is wider now.
   bool widen_nearest(const Vec3& d) {
+    if (caps_ == 0) return false;
     Cap* near = std::max_element(cap_, cap_ + caps_,
                                  [&](const Cap& a, const Cap& b) { return d.dot(a.d) < d.dot(b.d); });
     const double angle = std::acos(near->cosine);
@@ -461,7 +475,7 @@ class DeepSearch {
     cells_ = 6 * n * n;
     if (lowest.d.squaredNorm() > 0) look(refine_guess(pair_, lowest).d);
     if (!closed_ && threshold_ < kFarAway) leave_saddle();
-    return closed_;
+    return closed_ || (limits_.capless && threshold_ < kFarAway);
   }
 
   // Downhill from what is stationary and no minimum.
@@ -478,11 +492,12 @@ class DeepSearch {
 
   bool rest() {
     while (count_ > 0) {
-      if (++cells_ > kMostDirectionCells) return false;
+      if (++cells_ > limits_.cells) return false;
       const DirectionCell cell = cell_[--count_];
       const Corners corners(cell);
       if (excluded(cell, corners)) continue;
-      if (cell.depth() >= kNewtonDepth && (cell.depth() - kNewtonDepth) % 2 == 0 && is_new(cell, corners)) {
+      if (cell.depth() >= kNewtonDepth && (cell.depth() - kNewtonDepth) % 2 == 0 && may_look() &&
+          is_new(cell, corners)) {
         const int caps = caps_;
         const double threshold = threshold_;
         if (!look_around(corners.middle().normalized())) return false;
@@ -495,7 +510,7 @@ class DeepSearch {
         }
         if (excluded_by_supports(cell, corners)) continue;
       }
-      if (cell.depth() == kDeepest) {
+      if (cell.depth() == limits_.deepest) {
         if (give_up_margin() && excluded(cell, corners)) continue;
         return false;
       }
@@ -507,6 +522,9 @@ class DeepSearch {
     }
     return true;
   }
+
+  // Where cells may not do without, it ends when no search is left.
+  bool may_look() const { return !limits_.capless || newtons_ < limits_.newtons; }
 
   // Where no search has begun; of large cells those twice as far from every minimum as its cap reaches.
   bool is_new(const DirectionCell& cell, const Corners& corners) const {
@@ -528,6 +546,7 @@ class DeepSearch {
   }
 
   const PairFrame& pair_;
+  const Limits& limits_;
   const InnerMap &inner_a_, &inner_b_;
   const double tolerance_, noise_;
   const double widest_;  // sum of the bodies' largest curvature radii
@@ -541,19 +560,20 @@ class DeepSearch {
   JointSolution best_;
   int caps_ = 0, count_ = 0, cells_ = 0, newtons_ = 0, supports_ = 0, next_widening_ = kBeforeWidening,
       widening_ = 0, iterations_ = 0;
-  Cap cap_[kMostCaps];
-  Vec3 looked_[kMostNewtons];  // where searches began
-  DirectionCell cell_[6 * (1 << kFirstDepth) * (1 << kFirstDepth) + 4 * kDeepest];
+  Cap cap_[kLast.caps];
+  Vec3 looked_[kLast.newtons];  // where searches began
+  DirectionCell cell_[6 * (1 << kFirstDepth) * (1 << kFirstDepth) + 4 * kLast.deepest];
 };
 
 }  // namespace
 
-bool search_deep(const PairFrame& pair, double tolerance, JointSolution* best, DeepProof* proof) {
-  return DeepSearch(pair, tolerance).run(best, proof);
+bool search_deep(const PairFrame& pair, double tolerance, JointSolution* best, DeepProof* proof,
+                 DeepEffort effort) {
+  return DeepSearch(pair, tolerance, effort == DeepEffort::last ? kLast : kUsual).run(best, proof);
 }
 
 bool still_deepest(const PairFrame& pair, double tolerance, const DeepProof& proof, JointSolution* s) {
-  return DeepSearch(pair, tolerance).still_deepest(proof, s);
+  return DeepSearch(pair, tolerance, kUsual).still_deepest(proof, s);
 }
 
 }  // namespace nurbs

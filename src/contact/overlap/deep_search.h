@@ -35,7 +35,12 @@ namespace nurbs {
 // which costs some more cells; its level is 0 where none is to be had, as of two minima as good as each
 // other.
 struct DeepProof;
-bool search_deep(const PairFrame& pair, double tolerance, JointSolution* best, DeepProof* proof = nullptr);
+enum class DeepEffort {
+  usual,  // given up where the polytope is likely to cost less
+  last,   // where all else has failed: more and smaller cells, and minima without caps; 1 to 15 ms
+};
+bool search_deep(const PairFrame& pair, double tolerance, JointSolution* best, DeepProof* proof = nullptr,
+                 DeepEffort effort = DeepEffort::usual);
 
 // What a deep pair remembers, in place of a local model, as plain doubles: at the pose given, p is at least
 // `level` for all directions further than the cap's angle from `direction`. B is seen from A, so that a pair
