@@ -76,10 +76,11 @@ void archive(Archive& a, Meridian& s) {
   a(pieces, sectors, starts, sector_of, axes, point, beyond, error, bounds, exact, ripple, seam);
 }
 
-// Of a body of revolution whose joints meet to round-off. `size`: bounding radius. Patches in a plane square
-// to the axis need not be such products: the rest bounds them. Few digits may keep a body off it by `allowed`
-// of the size: it then serves where that is little of what is asked for, or as the product that the ripple is
-// off of.
+// Of a body of revolution whose joints meet to round-off, or that `allowed` lets ripple: then gaps round the
+// axis are the seam's, and gaps along the profile its pieces' ends'. `size`: bounding radius. Patches in a
+// plane square to the axis need not be such products: the rest bounds them. Few digits may keep a body off it
+// by `allowed` of the size: it then serves where that is little of what is asked for, or as the product that
+// the ripple is off of.
 Meridian make_meridian(const std::vector<BezierPatch>& patches, const Revolution& revolution, double size,
                        double allowed = kMeridianError);
 

@@ -24,7 +24,7 @@ void archive(Archive& a, NearRevolution& s) {
   a(revolution, meridian, radii);
 }
 
-// Of a body whose joints meet and that is none of revolution itself, or only to more than round-off; off that
+// Of a body that is none of revolution itself, or only to more than round-off, or whose joints gape; off one
 // by no more than kNearRevolution of its size.
 NearRevolution find_near_revolution(const std::vector<BezierPatch>& patches, const Mat3& inertia,
                                     double size);

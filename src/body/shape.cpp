@@ -268,7 +268,7 @@ void measure(Draft& draft) {
   s.ellipsoid = find_ellipsoid(s.patches, s.mass.inertia / s.mass.volume);
   s.revolution = find_revolution(s.patches, s.mass.inertia, s.ellipsoid, s.bounding_radius);
   if (s.joint_slack == 0) s.meridian = make_meridian(s.patches, s.revolution, s.bounding_radius);
-  if (s.joint_slack == 0 && !(s.revolution.found && s.revolution.error <= kExactTurn * s.bounding_radius))
+  if (s.joint_slack > 0 || !(s.revolution.found && s.revolution.error <= kExactTurn * s.bounding_radius))
     s.near_revolution = find_near_revolution(s.patches, s.mass.inertia, s.bounding_radius);
   SurfaceBounds bounds = bound_surface(s, is_sphere(s));
   if (is_sphere(s)) take_as_sphere(s, &bounds);
