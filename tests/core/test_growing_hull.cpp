@@ -7,6 +7,7 @@
 #include <memory>
 #include <vector>
 
+#include "contact/overlap/face_distances.h"
 #include "contact/overlap/growing_hull.h"
 #include "support/random.h"
 
@@ -70,6 +71,36 @@ TEST(GrowingHull, foot_of_a_needle) {
     const GrowingHull::Nearest near = hull->nearest();
     EXPECT_FALSE(near.inside) << k;
     EXPECT_NEAR(std::sqrt(near.distance2), off, 1e-15 + 2e-3 * off) << k;
+  }
+}
+
+// Of triangles without some vertices, while the hull grows, moves to other targets and begins again.
+TEST(FaceDistances, are_those_of_all_triangles_however_the_hull_grows) {
+  Random random(3);
+  const auto left_out = [](short v) { return v % 5 == 3; };
+  for (int body = 0; body < 30; ++body) {
+    const auto hull = tetrahedron();
+    const auto distances = std::make_unique<FaceDistances>();
+    Vec3 target = random.uniform(0, 3) * random.direction();
+    for (int k = 0; k < 150; ++k) {
+      if (random.below(20) == 0) target = random.uniform(0, 3) * random.direction();
+      if (k == 100) {
+        ASSERT_TRUE(hull->start(4, 5, 6, 7));
+        distances->forget();
+      }
+      const FaceDistances::Nearest near = distances->nearest(*hull, target, left_out);
+      double least = kFarAway;
+      for (int f = 0; f < hull->faces(); ++f) {
+        const GrowingHull::Face& face = hull->face(f);
+        if (!face.alive || std::any_of(face.vertex.begin(), face.vertex.end(), left_out)) continue;
+        const Vec3 p = hull->point(face.vertex[0]) - target, q = hull->point(face.vertex[1]) - target,
+                   r = hull->point(face.vertex[2]) - target, w = nearest_on_triangle(p, q, r);
+        least = std::min(least, (w[0] * p + w[1] * q + w[2] * r).squaredNorm());
+      }
+      ASSERT_EQ(near.distance2, least) << body << " " << k;
+      ASSERT_EQ(near.face < 0, least == kFarAway);
+      hull->grow(hull->store(random.uniform(0.8, 2) * random.direction()), kEps);
+    }
   }
 }
 
