@@ -28,10 +28,7 @@ bool search_about(const PairFrame& pair, bool k_is_a, const RoundEdges* arcs, do
   return false;
 }
 
-}  // namespace
-
-bool search_rings(const PairFrame& pair, double tolerance, bool last, PolytopeResult* result) {
-  tolerance = std::max(tolerance, kLeastWidth * pair.reach);
+bool search_axes(const PairFrame& pair, double tolerance, bool last, PolytopeResult* result) {
   double left = kAllRings;
   for (const bool k_is_a : {true, false}) {
     const Shape& k = k_is_a ? *pair.a : *pair.b;
@@ -42,6 +39,15 @@ bool search_rings(const PairFrame& pair, double tolerance, bool last, PolytopeRe
       if (search_about(pair, k_is_a, &arcs, tolerance, last, &left, result)) return true;
   }
   return false;
+}
+
+}  // namespace
+
+// As wide as asked for or, at last, where round-off leaves no such bracket, as wide as it leaves one.
+bool search_rings(const PairFrame& pair, double tolerance, bool last, PolytopeResult* result) {
+  const double least = kLeastWidth * pair.reach;
+  return search_axes(pair, tolerance, last, result) ||
+         (last && tolerance < least && search_axes(pair, least, last, result));
 }
 
 }  // namespace nurbs
