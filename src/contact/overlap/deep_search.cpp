@@ -24,10 +24,9 @@ struct Limits {
   int cells, deepest;      // halvings of a cell
   int supports, widening;  // points that caps are widened by
   int newtons, caps;
-  bool capless;        // cells may do where the least minimum has no cap ...
-  double of_supports;  // ... and then supports have to be right to this share of what they usually are
+  bool capless;  // cells may do where the least minimum has no cap
 };
-constexpr Limits kUsual{800, 9, 28, 100, 12, 8, false, 1}, kLast{60000, 20, 15000, 2000, 64, 32, true, 0.1};
+constexpr Limits kUsual{800, 9, 28, 100, 12, 8, false}, kLast{60000, 20, 15000, 2000, 64, 32, true};
 constexpr int kStretches = static_cast<int>(kStretchCaps.size()), kCaps = static_cast<int>(kInnerCaps.size());
 constexpr double kLeastCap = 0.012;  // rad: about the best minimum; less would leave thousands of cells
 constexpr std::array<double, 2> kWidened = {0.21, 0.42};  // rad, that caps are widened to in turn
@@ -119,11 +118,11 @@ struct Corners {
   }
 };
 
+template <const Limits& kLimits>
 class DeepSearch {
  public:
-  DeepSearch(const PairFrame& pair, double tolerance, const Limits& limits)
+  DeepSearch(const PairFrame& pair, double tolerance)
       : pair_(pair),
-        limits_(limits),
         inner_a_(pair.a->lazy_inner_map.known()),
         inner_b_(pair.b->lazy_inner_map.known()),
         tolerance_(tolerance),
@@ -217,16 +216,10 @@ class DeepSearch {
 
   // The same from the supports along the cell's middle, for cells so small that the nodes are far off.
   bool excluded_by_supports(const DirectionCell& cell, const Corners& corners) {
-    if (++supports_ > limits_.supports) return false;
+    if (++supports_ > kLimits.supports) return false;
     const Vec3 middle = corners.middle(), d = middle.normalized(), on_b = pair_.direction_on_b(d);
     const Radii r = radii(nearest(inner_a_, d), nearest(inner_b_, on_b), cap_of_depth(cell.depth()));
-    const auto [a, b] = hull_supports(pair_, d, nullptr, nullptr, limits_.of_supports * tolerance_);
-    if (limits_.capless && newtons_ < limits_.newtons &&
-        pair_.overlap_along(d, a.upper, b.upper) < threshold_) {
-      // Where minima lie closer together than searches begin.
-      looked_[newtons_++] = d;
-      if (!go_from(a.where, b.where)) supports_ = limits_.supports;
-    }
+    const auto [a, b] = hull_supports(pair_, d, nullptr, nullptr, tolerance_);
     const Vec3 g =
         pair_.place_a(a.point) - r.a * a.normal - pair_.place_b(b.point) + r.b * (pair_.turn * b.normal);
     return corners.above(g, r.level + noise_);
@@ -235,7 +228,7 @@ class DeepSearch {
   // Newton from where the atlases have the supports along a direction (of any length). False where the search
   // can't go on.
   bool look(const Vec3& d) {
-    if (newtons_ == limits_.newtons) return false;
+    if (newtons_ == kLimits.newtons) return false;
     looked_[newtons_++] = d.normalized();
     const Shape &a = *pair_.a, &b = *pair_.b;
     return go_from(a.atlas.place(d), b.atlas.place(pair_.direction_on_b(d)));
@@ -300,8 +293,8 @@ class DeepSearch {
         kept_ = grown;
       }
     }
-    if (grown.angle < kLeastCap) return !lowest || limits_.capless;
-    if (caps_ == limits_.caps) return false;
+    if (grown.angle < kLeastCap) return !lowest || kLimits.capless;
+    if (caps_ == kLimits.caps) return false;
     cap.cosine = std::cos(grown.angle);
     cap_[caps_++] = cap;
     return true;
@@ -326,7 +319,7 @@ class DeepSearch {
       balls[k] = {pair_.scale_a * a.radius[k], pair_.scale_b * b.radius[k], kInnerCaps[k] - off};
     for (int k = 0; k <= kCaps; ++k)
       if (balls[k].valid >= wanted || balls[k + 1].sum() <= kAsLarge * balls[k].sum())
-        proven = widen_cap(pair_, minimum, balls[k], proven, wanted, limits_.widening, &widening_);
+        proven = widen_cap(pair_, minimum, balls[k], proven, wanted, kLimits.widening, &widening_);
     return proven;
   }
 
@@ -475,7 +468,7 @@ class DeepSearch {
     cells_ = 6 * n * n;
     if (lowest.d.squaredNorm() > 0) look(refine_guess(pair_, lowest).d);
     if (!closed_ && threshold_ < kFarAway) leave_saddle();
-    return closed_ || (limits_.capless && threshold_ < kFarAway);
+    return closed_ || (kLimits.capless && threshold_ < kFarAway);
   }
 
   // Downhill from what is stationary and no minimum.
@@ -492,7 +485,7 @@ class DeepSearch {
 
   bool rest() {
     while (count_ > 0) {
-      if (++cells_ > limits_.cells) return false;
+      if (++cells_ > kLimits.cells) return false;
       const DirectionCell cell = cell_[--count_];
       const Corners corners(cell);
       if (excluded(cell, corners)) continue;
@@ -510,7 +503,7 @@ class DeepSearch {
         }
         if (excluded_by_supports(cell, corners)) continue;
       }
-      if (cell.depth() == limits_.deepest) {
+      if (cell.depth() == kLimits.deepest) {
         if (give_up_margin() && excluded(cell, corners)) continue;
         return false;
       }
@@ -524,7 +517,7 @@ class DeepSearch {
   }
 
   // Where cells may not do without, it ends when no search is left.
-  bool may_look() const { return !limits_.capless || newtons_ < limits_.newtons; }
+  bool may_look() const { return !kLimits.capless || newtons_ < kLimits.newtons; }
 
   // Where no search has begun; of large cells those twice as far from every minimum as its cap reaches.
   bool is_new(const DirectionCell& cell, const Corners& corners) const {
@@ -546,7 +539,6 @@ class DeepSearch {
   }
 
   const PairFrame& pair_;
-  const Limits& limits_;
   const InnerMap &inner_a_, &inner_b_;
   const double tolerance_, noise_;
   const double widest_;  // sum of the bodies' largest curvature radii
@@ -560,20 +552,21 @@ class DeepSearch {
   JointSolution best_;
   int caps_ = 0, count_ = 0, cells_ = 0, newtons_ = 0, supports_ = 0, next_widening_ = kBeforeWidening,
       widening_ = 0, iterations_ = 0;
-  Cap cap_[kLast.caps];
-  Vec3 looked_[kLast.newtons];  // where searches began
-  DirectionCell cell_[6 * (1 << kFirstDepth) * (1 << kFirstDepth) + 4 * kLast.deepest];
+  Cap cap_[kLimits.caps];
+  Vec3 looked_[kLimits.newtons];  // where searches began
+  DirectionCell cell_[6 * (1 << kFirstDepth) * (1 << kFirstDepth) + 4 * kLimits.deepest];
 };
 
 }  // namespace
 
 bool search_deep(const PairFrame& pair, double tolerance, JointSolution* best, DeepProof* proof,
                  DeepEffort effort) {
-  return DeepSearch(pair, tolerance, effort == DeepEffort::last ? kLast : kUsual).run(best, proof);
+  if (effort == DeepEffort::last) return DeepSearch<kLast>(pair, tolerance).run(best, proof);
+  return DeepSearch<kUsual>(pair, tolerance).run(best, proof);
 }
 
 bool still_deepest(const PairFrame& pair, double tolerance, const DeepProof& proof, JointSolution* s) {
-  return DeepSearch(pair, tolerance, kUsual).still_deepest(proof, s);
+  return DeepSearch<kUsual>(pair, tolerance).still_deepest(proof, s);
 }
 
 }  // namespace nurbs

@@ -87,9 +87,8 @@ PolytopeResult PolytopeSearch::with_points(const Vec3& a, const Vec3& b) const {
   return r;
 }
 
-// What the witnesses of direction_ are to be apart: the hull's point nearest to the origin or, when that is
-// inside, its foot on the supporting plane. (Of a flat of the obstacle, which is several triangles, or of
-// two equal minima other points would not face each other.)
+// What the witnesses of direction_ are to be apart: the origin's foot on the supporting plane. (Of a flat of
+// the obstacle, which is several triangles, or of two equal minima other points would not face each other.)
 Vec3 PolytopeSearch::target() const {
   return -(lower_ + shrink_) * direction_;
 }

@@ -437,8 +437,9 @@ Vec3 least_across(const Body& a, const Body& b, const Vec3& u, const Vec3& d) {
   return along(angle);
 }
 
-// Two parallel lines. `room`, where there are none: how far points may go before there may be. `rolls`: they
-// were so before, and the normal has turned with A, not to where the lines have gone.
+// Two parallel lines; ruled ones in the plane across which the bodies overlap least. `room`, where there are
+// none: how far points may go before there may be. `rolls`: they were so before, and the normal has turned
+// with A, not to where the lines have gone.
 bool line_contact(const Body& a, const Body& b, Vec3 d, double overlap, double reach,
                   const SurfacePoint* starts, bool rolls, ContactPolygon* out, double* room) {
   // Both bodies need a feature that lags no more than that behind their support.
