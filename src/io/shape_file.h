@@ -1,4 +1,4 @@
-// Shape files: JSON in the layout of NURBS-Python (geomdl); see README, "Shape files".
+// Shape files: JSON in the layout of NURBS-Python (geomdl); see README, "Shapes".
 #pragma once
 
 #include <memory>

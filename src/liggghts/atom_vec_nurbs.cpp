@@ -1,4 +1,4 @@
-// atom_style nurbs. See atom_vec_nurbs.h; file formats are in the README, "Data files".
+// atom_style nurbs. See atom_vec_nurbs.h; data files are told in examples/README.md.
 #include "liggghts/atom_vec_nurbs.h"
 
 #include <algorithm>

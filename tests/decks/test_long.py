@@ -79,7 +79,7 @@ class Crowds(unittest.TestCase):
         for ranks in (2, 4):
             again = deck.run_ok(AGAIN + "timestep 5e-5\n" + MOTION + "run 1000\nundump d\n" + MOTION[MOTION.index("dump d"):] + "run 0\n",
                                 ranks=ranks, files={"a.restart": whole.path / "a.restart"})
-            self.check_same(whole, again, 1e-9)  # periodic: round-off, see the README
+            self.check_same(whole, again, 1e-9)  # periodic: round-off, see examples/README.md, "Restarts"
 
     def test_deletion_frozen_groups_and_ranks_without_particles(self):
         """On four ranks all particles are soon on one or two; some vanish, some stay put."""

@@ -1,5 +1,5 @@
 #!/usr/bin/python3
-"""The deck that the README prints runs as printed."""
+"""The decks that the README and the guide (examples/README.md) print run as printed; their links lead somewhere."""
 import re
 import sys
 import tempfile
@@ -13,10 +13,21 @@ import deck  # noqa: E402
 from test_walls import stl  # noqa: E402
 
 
+def section(heading, file="README.md"):
+    return (deck.ROOT / file).read_text().split(f"\n## {heading}\n")[1].split("\n## ")[0]
+
+
+def printed(text):
+    """What stands indented: decks, or parts of them."""
+    return re.findall(r"^    (.*)$", text, re.MULTILINE)
+
+
+GUIDE = "examples/README.md"
+
+
 class Readme(unittest.TestCase):
     def test_its_deck_runs(self):
-        section = (deck.ROOT / "README.md").read_text().split("\n## A deck\n")[1].split("\n## ")[0]
-        lines = re.findall(r"^    (.*)$", section, re.MULTILINE)
+        lines = printed(section("A deck"))
         self.assertGreater(len(lines), 10)
         result = deck.run_ok("\n".join(lines) + "\n", files={"pebble.json": deck.shape_file("pebble")})
         self.assertNotIn("WARNING", result.screen)
@@ -25,9 +36,7 @@ class Readme(unittest.TestCase):
         self.assertLess(result.thermo["KinEng"][-1], 2e6)  # 7e7 J in free fall: the floor holds them
 
     def test_its_ledger(self):
-        text = (deck.ROOT / "README.md").read_text()
-        lines = lambda name: re.findall(r"^    (.*)$", text.split(f"\n## {name}\n")[1].split("\n## ")[0], re.MULTILINE)  # noqa: E731
-        pebbles, ledger = lines("A deck"), lines("Styles")
+        pebbles, ledger = printed(section("A deck")), printed(section("Energy", GUIDE))
         self.assertEqual(len(ledger), 8)
         short = [line for line in pebbles if not line.startswith(("dump", "run"))]
         thermo = deck.run_ok("\n".join(short + ledger) + "\nrun 15000\n", files={"pebble.json": deck.shape_file("pebble")}).thermo
@@ -37,8 +46,7 @@ class Readme(unittest.TestCase):
 
     def test_its_lines_from_a_deck_for_spheres(self):
         """All of them in one deck, with the materials, the meshes and the box that they speak of: grains pour, and rolling counts."""
-        section = (deck.ROOT / "README.md").read_text().split("\n## From a deck for spheres\n")[1].split("\n## ")[0]
-        lines = re.findall(r"^    (.*)$", section.split("\nA whole deck")[0], re.MULTILINE)
+        lines = printed(section("From a deck for spheres")) + printed(section("Pouring and insertion", GUIDE))
         style = next(line for line in lines if line.startswith("atom_style"))
         start = f"""units si
 newton off
@@ -65,10 +73,10 @@ fix gravity all gravity 9.81 vector 0 0 -1
 
     def test_its_whole_deck(self):
         """Files made as it says; grains stay in the drum, which carries them up; the restart goes on, on another number of ranks."""
-        section = (deck.ROOT / "README.md").read_text().split("\n## From a deck for spheres\n")[1].split("\n## ")[0].split("\nA whole deck")[1]
-        lines = re.findall(r"^    (.*)$", section, re.MULTILINE)
+        text = section("A whole deck", GUIDE)
+        lines = printed(text)
         with tempfile.TemporaryDirectory() as place:
-            for command in re.findall(r"`build/nurbs-shape ([^`]*)`", section.replace("\n", " ")):
+            for command in re.findall(r"`build/nurbs-shape ([^`]*)`", text.replace("\n", " ")):
                 deck.nurbs_shape(*command.split(), cwd=place).check_returncode()
             files = {name: Path(place) / name for name in ("grain.json", "drum.stl")}
             run = deck.run_ok("\n".join(lines) + "\n", files=files, ranks=2)
@@ -83,8 +91,7 @@ fix gravity all gravity 9.81 vector 0 0 -1
 
     def test_its_restart_recipe(self):
         """What the README says to repeat after read_restart, and no more, goes on to the last bit."""
-        section = (deck.ROOT / "README.md").read_text().split("\n## A deck\n")[1].split("\n## ")[0]
-        lines = re.findall(r"^    (.*)$", section, re.MULTILINE)
+        lines = printed(section("A deck"))
         kept = [line for line in lines if line.split()[0] not in ("dump", "run", "thermo")]
         output = "dump d all custom 500 dump.txt id x y z omegax\ndump_modify d format \"%d %.17g %.17g %.17g %.17g\"\nrun 500\n"
         pebble = {"pebble.json": deck.shape_file("pebble")}
@@ -99,6 +106,33 @@ fix gravity all gravity 9.81 vector 0 0 -1
             np.testing.assert_array_equal(expected[name], found[name])
         forgotten = deck.run_ok(again.replace("timestep", "#"), files={"a.restart": whole.path / "a.restart"})
         self.assertIn("no 'timestep'", forgotten.screen)
+
+    def test_its_restart_deck(self):
+        """The deck printed for going on is the first one's lines that have to be repeated, and no others."""
+        lines, again = printed(section("A deck")), printed(section("Restarts", GUIDE))
+        repeated = [line for line in lines if line.split()[0] in ("newton", "communicate", "neighbor", "neigh_modify", "fix", "timestep", "run")]
+        self.assertEqual(again, [repeated[0], "read_restart half.restart", *repeated[1:]])
+
+
+class Links(unittest.TestCase):
+    def test_links_lead_somewhere(self):
+        """Files and headings (as GitHub names them) of every relative link in the READMEs."""
+        anchors = lambda text: {re.sub(r"[^\w -]", "", heading.lower()).replace(" ", "-")  # noqa: E731
+                                for heading in re.findall(r"^#+ (.*)$", text, re.MULTILINE)}
+        pages = [deck.ROOT / "README.md", *(page for place in ("src", "examples", "tests", "bench") for page in (deck.ROOT / place).rglob("*.md"))]
+        self.assertGreater(len(pages), 10)
+        links = 0
+        for page in pages:
+            for link in re.findall(r"\]\(([^)\s]+)\)", page.read_text()):
+                if "://" in link:
+                    continue
+                links += 1
+                name, _, anchor = link.partition("#")
+                target = page.parent / name if name else page
+                self.assertTrue(target.exists(), f"{page}: {link}")
+                if anchor:
+                    self.assertIn(anchor, anchors(target.read_text()), f"{page}: {link}")
+        self.assertGreater(links, 50)
 
 
 if __name__ == "__main__":
