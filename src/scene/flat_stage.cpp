@@ -293,19 +293,24 @@ bool ContactStages::serve_flat(ContactBlock& block, int lane, LeftPolygon* left)
       return false;
     }
   }
-  if (!step_.setup && rest.rests) relax_polygon(block, lane, rest, flat, &state);
+  if (!step_.setup && adjusted) relax_polygon(block, lane, rest, flat, &state);
   counts_.value[ContactCounts::local_model] += share(a, b);
   run_flat(block, lane, flat, state);
   return true;
 }
 
-// Towards the polygon's own stiffness and place; what the springs give up or get is booked.
+// Towards the polygon's own stiffness and place, where it rests; to its stiffness from a greater one also where
+// it lasts: what towers and shaken beds stand on would stay four times as stiff as the law, and as their step
+// is for. What the springs give up or get is booked.
 void ContactStages::relax_polygon(const ContactBlock& block, int lane, const ContactRest& rest,
                                   FlatContact& flat, PolygonState* state) {
+  flat.polygon.age += static_cast<float>(rest.phase);
+  const bool lasts = flat.polygon.age > kLasting && flat.polygon.factor > 1;
+  if (!rest.rests && !lasts) return;
   const ContactCoefficients law =
       coefficients(block, lane);  // zeros where a model serves, which books itself
   double energy = 0;
-  if (flat.polygon.shift != 0) {
+  if (flat.polygon.shift != 0 && rest.rests) {
     energy -= law.kn * stored_energy(flat.polygon, *state);
     come_closer(kRelaxation * rest.phase, record(block.b[lane]).radius, &flat.polygon.shift);
     *state = now(flat.polygon, *step_.bodies, wall_frame(block.a[lane]), block.a[lane], block.b[lane]);
@@ -364,6 +369,7 @@ bool ContactStages::remake(ContactBlock& block, int lane, FlatContact& flat, Pol
   if (flat.polygon.rolling != 0 && polygon.rolling == 0 && !find(2 * kReach)) return false;
   polygon.factor = flat.polygon.factor;
   polygon.shift = flat.polygon.shift;
+  polygon.age = flat.polygon.age;
   PolygonState fresh = now(polygon, *step_.bodies, wall_frame(a), a, b);
   int source[kContactPoints];
   match(flat.polygon, state, polygon, fresh, source);

@@ -17,7 +17,8 @@ constexpr double kRelaxation = 0.1;
 // Of the speed and the acceleration of an oscillation as wide as its overlap, that a contact at rest has:
 // small against both, whatever the time step. One that turns back in a bounce has the acceleration.
 constexpr double kResting = 0.02;
-constexpr double kLasting = 12;    // rad of a contact's oscillation: a bounce, which has pi, is over by then
+constexpr double kLasting = 12;    // rad of a contact's oscillation: a bounce, which has pi, is over by then;
+                                   // a factor falls then without rest too, as that takes energy out only
 constexpr double kArrival = 1.1;   // ways of a step that a contact which begins at its surface is deep
 constexpr double kStiffest = 8;    // factor or weight of a contact; four is what a corner needs
 constexpr double kSoftest = 1e-3;  // weight of one whose polygon held nothing over its part of a mesh's
@@ -38,17 +39,18 @@ inline ContactRest rest_of(const ContactState& s, const BodyRecord& a, const Bod
   r.rests = std::abs(s.rate) * s.dt <= wide && std::abs(change) * s.dt <= wide * r.phase;
   return r;
 }
-// Of the first `count` points of a polygon: all of those that bear rest, and the slowest one's phase. One on
-// which none bears doesn't.
+// Of the first `count` points of a polygon: all of those that bear rest, and the slowest one's phase of those
+// that push (a damper may hold back a spring). One on which none bears doesn't.
 inline ContactRest rest_of(const FlatContact& flat, int count, const BodyRecord& a, const BodyRecord& b) {
   ContactRest all{1, true};
   bool bears = false;
-  for (int k = 0; k < count && all.rests; ++k) {
+  for (int k = 0; k < count; ++k) {
     ContactState point;
     flat.points.get(k, kStateField, kContactStateSize, &point);
     if (point.active == 0) continue;
     const ContactRest one = rest_of(point, a, b);
-    all = {std::min(all.phase, one.phase), one.rests};
+    if (one.phase > 0) all.phase = std::min(all.phase, one.phase);
+    all.rests = all.rests && one.rests;
     bears = true;
   }
   return bears ? all : ContactRest{};

@@ -26,10 +26,10 @@ class Bodies:
         return stability.Shape(name, Bodies.directory.name)
 
 
-def run(name, body, fraction, **options):
+def run(name, body, fraction, seed=7, **options):
     """Outcome of a scene of bench/stability.py."""
     shape = Bodies.get(body)
-    scene = stability.SCENES[name](shape, np.random.default_rng(7), **options)
+    scene = stability.SCENES[name](shape, np.random.default_rng(seed), **options)
     return stability.simulate(scene, shape, fraction)
 
 
@@ -94,6 +94,17 @@ class Damped(unittest.TestCase):
         self.assertLess(outcome.creep, 5e-3)
         self.assertLess(outcome.error.max(), 1e-12)
         self.assertEqual(outcome.unresolved, 0)
+
+    def test_towers_of_boxes_come_to_rest(self):
+        """Boxes land on their corners, so that faces begin up to four times as stiff as the law. Where they stayed so
+        until they rested, they did not: four times the springs and twice the dampers on four points are too much for this
+        step, and towers swayed for ever by 1e-8 to 8e-5 of the energy of their fall."""
+        for seed in (7, 1, 5, 10):
+            with self.subTest(seed=seed):
+                outcome = run("stack", "box", 0.025, seed)
+                print(f"    tower {seed}: kinetic energy {outcome.kinetic[-1]:.1e}", flush=True)
+                self.assertLess(outcome.kinetic[-1], 1e-12)
+                self.assertLess(outcome.error.max(), 1e-12)
 
 
 if __name__ == "__main__":

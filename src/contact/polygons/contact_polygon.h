@@ -19,7 +19,7 @@
 //     nothing.
 //  2. Hand-over: give_energy(U before / kn, ..) keeps U continuous. A polygon that would hold less is stiffer
 //     by its factor (a corner that comes down flat: up to 4), and relax(polygon, state, dt / time) brings
-//     that to 1 over some periods of the contact and returns the work / kn that this puts into the springs, <
+//     that to 1 over some periods of a contact that rests or lasts, and returns the work / kn that this puts into the springs, <
 //     0, to be booked. In one that would hold more the reference plane stands back by a shift, in which
 //     nothing is felt: it is as stiff as any other and gives back what it took, where a small factor would
 //     let bodies sink into each other. The shift goes under bodies at rest. A contact that opens (U = 0)
@@ -78,6 +78,7 @@ struct ContactPolygon {
   std::int32_t ring;     // > 0: a whole round face, number ring - 1; the points stand for eighths of its rim
   std::int32_t rolling;  // 1: remake every step, the points follow a ruled line
   std::int32_t far;      // the point furthest from point 0
+  float age;             // by the caller: how long factor or shift have been its, rad of its oscillation
   double normal[3];      // outward, of the reference plane, in its shape axes (a plane: lab axes)
   double offset;         // normal . x of that plane, scale 1 (a plane: 0, from its origin)
   double factor;         // see above; 1 unless set by the caller
