@@ -29,7 +29,7 @@ struct ContactRecord {
 };
 constexpr int kContactSize = kLocalModelSize + 10 + kContactStateSize + 6;
 static_assert(sizeof(ContactRecord) == kContactSize * sizeof(double));
-constexpr int kStateField = kLocalModelSize + 10;
+constexpr int kStateField = kLocalModelSize + 10, kStateNormal = kStateField + 3;
 
 constexpr int kWeight = kContactSize - 3, kFlat = kContactSize - 2, kShift = kContactSize - 1;
 

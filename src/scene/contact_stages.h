@@ -295,8 +295,8 @@ class ContactStages {
     std::uint64_t stamp = 0;            // the body's then, if it is known
     std::optional<PlaneRegion> region;  // of this step
     double path = 0;                    // of wall and body
-    double normal[3] = {};              // of the face that the contact follows by itself, through record.x
-    bool follows = false;               // it does
+    double normal[3] = {};              // of the contact, as found last
+    bool follows = false;               // it follows the face of that normal through record.x by itself
     // Of balanced contacts.
     std::uint64_t name = 0;  // of the piece of the wall
     double level = 0;        // normal . wall's point
@@ -309,6 +309,9 @@ class ContactStages {
   std::int32_t adopt_listed(std::int32_t number);
   void bind_listed(std::int32_t number, int body);
   void drop_listed(std::int32_t number);
+  Vec3 listed_normal(std::int32_t number) const;
+  // By which a wall stands back from a body, a listed contact's side of which is `a`.
+  double wall_shift(int a) const { return a < -1 ? partners_[-2 - a].shift : 0; }
   void end_listed(std::int32_t number);
   struct Former;
   int list_former(int body, std::int32_t head, Former* former);
@@ -333,7 +336,7 @@ class ContactStages {
   void stand_closer(std::int32_t number, int body, const ContactGeometry& geometry);
   void hold(Holding* h, int body, double energy);
   void balance(int body, Holding* holdings, int count, double left);
-  void stand_back(std::int32_t number, WallContact* found);
+  void stand_back(std::int32_t number, int body, WallContact* found);
 
   // Flat faces, creases and ruled lines: flat_stage.cpp.
   bool may_be_flat(int a, int b) const;

@@ -83,12 +83,7 @@ bool ContactStages::same_piece(std::int32_t number, int body, const WallContact&
   const Partner& p = partners_[number - 1];
   if (p.name == found.name) return true;
   if ((p.name & kPiece) != 0 || (found.name & kPiece) != 0) return false;
-  ContactState state;
-  const ContactBlock& block = pool_.blocks()[(number - 1) / kBlock];
-  const int lane = ContactPool::lane(number);
-  block.get(lane, kStateField, kContactStateSize, &state);
-  Vec3 normal = load(state.normal);
-  if (const FlatContact* flat = pool_.flat_of(block, lane)) normal = load(flat->polygon.normal);
+  const Vec3 normal = listed_normal(number);
   // The plane as it was, or where the wall's motion has brought it since.
   const Vec3 x = load(p.record.x), velocity = found.velocity + found.spin.cross(x - found.result.point_a);
   const Vec3& now = found.result.normal;
@@ -257,7 +252,7 @@ void ContactStages::balance_found(int body, WallContact* found, const std::int32
     }
     balance(body, holdings, count, left);
   }
-  for (int k = 0; k < count; ++k) stand_back(number[k], &found[k]);
+  for (int k = 0; k < count; ++k) stand_back(number[k], body, &found[k]);
 }
 
 // Under a body at rest the wall comes back; under one that has been on it for long, whose contacts hand over
@@ -295,12 +290,13 @@ void ContactStages::stand_closer(std::int32_t number, int body, const ContactGeo
 }
 
 // The wall as the contact feels it.
-void ContactStages::stand_back(std::int32_t number, WallContact* found) {
+void ContactStages::stand_back(std::int32_t number, int body, WallContact* found) {
   Partner& p = partner(number);
   ContactResult& r = found->result;
   p.name = found->name;
   p.level = r.normal.dot(r.point_a);
   if (p.shift == 0) return;
+  if (r.gap + p.shift >= 0 && found->weight > 0) note_depth(-1 - number, body, r.gap);  // not felt, yet there
   r.gap += p.shift;
   r.upper += p.shift;  // the lower bound stays: the body has not left the wall
   r.point_a -= p.shift * r.normal;

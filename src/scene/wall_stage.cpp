@@ -53,21 +53,28 @@ void ContactStages::drop_listed(std::int32_t number) {
   partner(number).next = 0;
 }
 
+// Of a contact without a force, which a wall stands back from, the law keeps none.
+Vec3 ContactStages::listed_normal(std::int32_t number) const {
+  const ContactBlock& block = pool_.blocks()[(number - 1) / kBlock];
+  const int lane = ContactPool::lane(number);
+  if (const FlatContact* flat = pool_.flat_of(block, lane)) return load(flat->polygon.normal);
+  if (block.field[kStateField][lane] == 0) return load(partner(number).normal);
+  return {block.field[kStateNormal][lane], block.field[kStateNormal + 1][lane],
+          block.field[kStateNormal + 2][lane]};
+}
+
 int ContactStages::former(std::int32_t head, FormerContact* contacts, PairMemory* memories) const {
   int count = 0;
   for (; head != 0 && count < kMostListed; head = partner(head).next) {
     const ContactBlock& block = pool_.blocks()[(head - 1) / kBlock];
     const int lane = ContactPool::lane(head);
-    double normal[3];
-    block.get(lane, kStateField + 3, 3, normal);
     PairMemory& m = memories[count];
     FormerContact& c = contacts[count++];
-    c = {load(normal), &m, false};
+    c = {listed_normal(head), &m, false};
     if (const FlatContact* flat = pool_.flat_of(block, lane)) {
       c.flat = true;
       c.polygon = &flat->polygon;
       c.until = flat->points.until[0];
-      c.normal = load(c.polygon->normal);
       c.frame = load(partner(head).record.x);
     }
     m.proof = partner(head).proof;
@@ -109,8 +116,9 @@ void ContactStages::update_listed(std::int32_t number, int body, const WallConta
       }
   }
   if (found.weight < 0) block.field[kWeight][lane] = found.weight;
+  store(found.result.normal, p.normal);
   p.follows = known && may_follow(number, body, found);
-  if (p.follows) return store(found.result.normal, p.normal);
+  if (p.follows) return;
   ContactResult r = found.result;
   r.point_a -= x;
   r.point_b -= x;
@@ -163,14 +171,13 @@ int ContactStages::list_former(int body, std::int32_t head, Former* former) {
     const Vec3 wrapped = periods_in(step_.period, load(b.x) - load(partner(n).body));
     if (!wrapped.isZero()) {
       store(Vec3(load(wall.x) + wrapped), wall.x);
-      partner(n).level += load(state.normal).dot(wrapped);
+      partner(n).level += listed_normal(n).dot(wrapped);
     }
     Former& f = former[count++];
-    f = {n, load(state.normal), load(wall.x) + load(state.arm_a), sign(block, lane) < 0, false, false};
+    f = {n, listed_normal(n), load(wall.x) + load(state.arm_a), sign(block, lane) < 0, false, false};
     if (const FlatContact* flat = pool_.flat(n)) {
       const ContactPolygon& polygon = flat->polygon;
       f.flat = true;
-      f.normal = load(polygon.normal);
       const Particle particle = step_.bodies->particle(body);
       f.point = particle.x + particle.scale * (particle.q * middle_of(polygon));
     }
@@ -358,7 +365,9 @@ int ContactStages::pack_list(std::int32_t head, double* to) const {
     std::memcpy(to + m + 17, &p.stamp, sizeof p.stamp);
     std::memcpy(to + m + 18, &p.proof, sizeof p.proof);
     m += kListedSize;
-    m += pool_.pack(head, to + m);
+    const int size = pool_.pack(head, to + m);
+    if (to[m + kStateField] == 0) std::memcpy(to + m + kStateNormal, p.normal, sizeof p.normal);
+    m += size;
   }
   to[0] = count;
   return m;
@@ -374,6 +383,7 @@ std::int32_t ContactStages::unpack_list(const double* from, int* size) {
     const std::int32_t loose = pool_.unpack(values + kListedSize, &record_size);
     const std::int32_t number = adopt_listed(loose);
     Partner& p = partner(number);
+    std::memcpy(p.normal, values + kListedSize + kStateNormal, sizeof p.normal);
     std::memcpy(p.record.x, values, 3 * sizeof(double));
     p.mark = static_cast<int>(values[3]);
     std::memcpy(p.body, values + 4, 3 * sizeof(double));
