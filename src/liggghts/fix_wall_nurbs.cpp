@@ -258,7 +258,7 @@ void FixWallNurbs::init() {
 void FixWallNurbs::warn_models(const PairGranNurbs& pair) {
   if (models_ == nullptr || pair.models() == nullptr) return;
   std::string missing;
-  for (const char* kind : {"cohesion", "rolling_friction"}) {
+  for (const char* kind : {"tangential", "cohesion", "rolling_friction"}) {
     const std::string pairs = pair.models()->named(kind);
     if (!pairs.empty() && pairs != "off" && models_->named(kind).empty())
       missing += (missing.empty() ? "" : " and ") + std::string(kind) + " " + pairs;

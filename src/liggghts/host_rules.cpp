@@ -82,6 +82,7 @@ void check_settings(LAMMPS* lmp) {
     refuse("cannot be used with 'run_style respa'; use verlet");
   if (lmp->update->whichflag == kMinimize)
     refuse("cannot be used with minimize: no orientation would be turned");
+  if (!(lmp->update->dt > 0)) fail_all(FLERR, lmp, "timestep = " + show(lmp->update->dt) + " must be > 0");
   if (lmp->force->cg_active()) refuse("cannot be used with coarsegraining");
 }
 

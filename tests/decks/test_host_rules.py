@@ -333,6 +333,7 @@ class Refused(unittest.TestCase):
                 (2, DECK.replace("0.3 bin", "0.3 multi"), "neighbor .. multi", "use bin"),
                 (1, DECK + "run_style respa 2 2 pair 1\n", "run_style respa", "verlet"),
                 (1, DECK + "change_box all triclinic\n", "triclinic", "orthogonal"),
+                (2, DECK + "timestep 0\n", "timestep = 0 must be > 0"), (1, DECK + "timestep -2e-5\n", "timestep = -2e-05 must be > 0"),
                 (1, DECK.replace("pair_style", "#").replace("pair_coeff", "#"), "no pair_style gran/nurbs"),
                 (1, DECK.replace("pair_style gran/nurbs", "pair_style hybrid gran/nurbs gran model hooke").replace("* * kn", "* * gran/nurbs kn"), "hybrid"),
                 (1, DECK.replace("gran/nurbs", "hybrid gran/nurbs").replace("* * kn", "* * gran/nurbs kn"), "hybrid"),
@@ -473,7 +474,7 @@ class Warned(unittest.TestCase):
                     self.assertEqual(len(told(other)), 1)
                     self.assertAlmostEqual(float(told(other)[0].split(" from where")[0].split()[-1]) / way, 1, delta=1e-3)
 
-    def test_walls_without_the_pair_styles_rolling_friction_or_cohesion(self):
+    def test_walls_without_the_pair_styles_tangential_model_rolling_friction_or_cohesion(self):
         """LIGGGHTS's own walls go without a word; here it is said once, unless the wall says off."""
         rolling = ("fix m5 all property/global coefficientRollingFriction peratomtypepair 2 .1 .1 .1 .1\n"
                    "fix m6 all property/global cohesionEnergyDensity peratomtypepair 2 10 10 10 10\n")
@@ -484,9 +485,11 @@ class Warned(unittest.TestCase):
         model = "model hertz tangential history"
         for pair, wall, words in ((" cohesion sjkr rolling_friction cdt", "", "no cohesion sjkr and rolling_friction cdt"),
                                   (" cohesion sjkr rolling_friction cdt", " rolling_friction cdt", "no cohesion sjkr,"),
+                                  ("", "without", "no tangential history,"), ("", "off", None),
                                   (" rolling_friction cdt", " rolling_friction off", None), (" rolling_friction off", "", None), ("", "", None)):
             for ranks in (1, 2):
-                told = [line for line in self.warnings(text.replace("PAIR", model + pair).replace("WALL", model + wall) + "run 1\nrun 1\n", ranks=ranks)
+                walls = {"without": "model hertz", "off": "model hertz tangential off"}.get(wall, model + wall)
+                told = [line for line in self.warnings(text.replace("PAIR", model + pair).replace("WALL", walls) + "run 1\nrun 1\n", ranks=ranks)
                         if "Fix wall/nurbs floor has no" in line]
                 self.assertEqual(len(told), 0 if words is None else 1, told)
                 self.assertIn(words or "", "".join(told))
