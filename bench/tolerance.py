@@ -1,10 +1,11 @@
 #!/usr/bin/python3
 """How loose may a run be? Cost and observable of the examples packing, hopper and drum over `tolerance` and time step.
 
-    bench/tolerance.py [--full] [--seeds N] [--only packing,hopper,drum] [--tolerances 1e-2,..] [--steps 0.5,..] [--output CSV]
+    bench/tolerance.py [--full] [--seeds N] [--only packing,hopper,drum] [--tolerances 1e-2,..] [--steps 0.5,..] [--grain FILE.json] [--output CSV]
     bench/tolerance.py --plot CSV                  draws a CSV again
 
-The decks are those of examples/, on one rank, with fewer grains (--full: as they stand there). Each seed is a round: every
+The decks are those of examples/, on one rank, with fewer grains (--full: as they stand there), of their ellipsoids or, with
+--grain, of another shape about as large. Each seed is a round: every
 tolerance at the deck's time step, then every other time step (in multiples of the deck's, simulated time kept) at the
 deck's tolerance, one after the other, so that costs are compared within a round. A row of the CSV is a run:
 
@@ -20,6 +21,7 @@ import importlib.util
 import math
 import os
 import pathlib
+import shutil
 import subprocess
 import sys
 import tempfile
@@ -51,14 +53,17 @@ class Scene:
         self.name, self.axes, self.title, self.measure = name, axes, title, measure
         self.small, self.quiet, self.meshes = small, quiet, meshes
 
-    def run(self, tolerance, step, seed, full):
+    def run(self, tolerance, step, seed, full, grain):
         """One run: (CPU microseconds per particle-step, observable, whether a contact was unresolved)."""
         with tempfile.TemporaryDirectory(prefix="nurbs-tolerance-") as place:
             place = pathlib.Path(place)
             text = deck.example(self.name, self.quiet + (() if full else self.small), time=step, steps=1 / step)
             (place / "in.deck").write_text(text)
-            make = [str(deck.BUILD / "nurbs-shape"), "make", "ellipsoid", "--axes", ",".join(self.axes), "-o", "grain.json"]
-            subprocess.run(make, cwd=place, check=True, stdout=subprocess.DEVNULL)
+            if grain:
+                shutil.copy(grain, place / "grain.json")
+            else:
+                make = [str(deck.BUILD / "nurbs-shape"), "make", "ellipsoid", "--axes", ",".join(self.axes), "-o", "grain.json"]
+                subprocess.run(make, cwd=place, check=True, stdout=subprocess.DEVNULL)
             script, *words = self.meshes[not full] or (None,)
             if script:
                 subprocess.run(["/usr/bin/python3", ROOT / "examples" / self.name / script, *words], cwd=place, check=True)
@@ -104,7 +109,7 @@ def measure(options):
         for seed in PRIMES[options.first:options.first + options.seeds]:
             for name in options.only:
                 for tolerance, step in settings:
-                    us, value, unresolved = SCENES[name].run(tolerance, step, seed, options.full)
+                    us, value, unresolved = SCENES[name].run(tolerance, step, seed, options.full, options.grain)
                     row = dict(zip(COLUMNS, (name, tolerance, step, seed, f"{us:.4g}", f"{value:.5g}", unresolved)))
                     print(row, flush=True)
                     table.writerow(row)
@@ -182,6 +187,7 @@ def main():
     parser.add_argument("--only", type=lambda text: text.split(","), default=list(SCENES))
     parser.add_argument("--tolerances", type=numbers, default=TOLERANCES)
     parser.add_argument("--steps", type=numbers, default=STEPS)
+    parser.add_argument("--grain", type=pathlib.Path)
     parser.add_argument("--output", type=pathlib.Path, default=deck.BUILD / "tolerance.csv")
     parser.add_argument("--plot", type=pathlib.Path)
     options = parser.parse_args()

@@ -58,6 +58,7 @@ double closest_parameter(const BezierPatch& patch, int edge, const Vec3& x) {
   return best;
 }
 
+constexpr double kOnCurve = 1e-12;  // of an edge's chord: what is no further away lies on the edge
 constexpr double kNoGap = 1e-6;        // of the tolerance: sides so near have the same parameters
 constexpr double kNotByChance = 1e-2;  // share of a gap that better parameters leave
 constexpr double kShortGap = 1e-3;     // of a short edge: what its partner may be off
@@ -354,7 +355,12 @@ double closest_on_edge(const BezierPatch& patch, int edge, const Vec3& x, double
   return t;
 }
 
-double projected_parameter(const BezierPatch& partner, const EdgeLink& link, const Vec3& x) {
+double projected_parameter(const BezierPatch& partner, const EdgeLink& link, const Vec3& x, double guess) {
+  if (guess >= 0) {
+    const double t = closest_on_edge(partner, link.edge, x, guess);
+    const Vec3 chord = edge_point(partner, link.edge, 1) - edge_point(partner, link.edge, 0);
+    if ((edge_point(partner, link.edge, t) - x).norm() <= kOnCurve * chord.norm()) return t;
+  }
   return closest_on_edge(partner, link.edge, x, closest_parameter(partner, link.edge, x));
 }
 

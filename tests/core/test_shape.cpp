@@ -212,6 +212,29 @@ TEST(Connectivity, SidesOnOneConicMayHaveAnyParameters) {
     }
 }
 
+// Gauss-Newton from a guess finds the place that the search of the whole edge does.
+TEST(Connectivity, PlacesAcrossProjectedJointsAreFoundFromAGuess) {
+  int projected = 0;
+  for (const double m : {0.499, 0.3, 0.05}) {
+    const auto shape = build(cylinder_of_other_parameters(4, m));
+    for (int p = 0; p < static_cast<int>(shape->patches.size()); ++p)
+      for (int edge = 0; edge < 4; ++edge) {
+        const EdgeLink& link = shape->links[p][edge];
+        if (!link.projected) continue;
+        ++projected;
+        for (int k = 0; k <= 20; ++k) {
+          const Vec2 at = edge_parameters(edge, k / 20.0);
+          const Vec3 x = evaluate0(shape->patches[p], at[0], at[1]);
+          const SurfacePoint found = across(shape->patches, link, {p, at[0], at[1]}, edge);
+          const double t = link.edge < 2 ? found.v : found.u;
+          EXPECT_LT((evaluate0(shape->patches[link.patch], found.u, found.v) - x).norm(), 1e-12);
+          EXPECT_NEAR(t, projected_parameter(shape->patches[link.patch], link, x), 1e-9);
+        }
+      }
+  }
+  EXPECT_GE(projected, 3 * 16);
+}
+
 // Off the conic by what still is a gap, and by what is none.
 TEST(Connectivity, SidesOffOneConicAreApart) {
   const auto shape = build(cylinder_of_other_parameters(12, 0.45, 1e-7));
