@@ -368,7 +368,9 @@ class ContactStages {
                    const PointMemories& memory) const;
   void relax_polygon(const ContactBlock& block, int lane, const ContactRest& rest, FlatContact& flat,
                      PolygonState* state);
-  PolygonState give(ContactPolygon* polygon, int a, int b, double energy, const PointMemories& memory) const;
+  void stand_at(double shift, int a, ContactPolygon* polygon);
+  void stand_at(double shift, int a, int lane, Results* results);
+  PolygonState give(ContactPolygon* polygon, int a, int b, double energy, const PointMemories& memory);
   void stand_off(ContactBlock& block, int lane, Results& results);
   void relax_single(ContactBlock& block, int lane, Results& results);
   void book(double energy, int a, int b);

@@ -100,13 +100,44 @@ double ContactStages::energy_of(const ContactPolygon& polygon, const PolygonStat
                                 : stored_energy(polygon, state);
 }
 
+// By how much a polygon's plane stands back: a listed wall does it itself.
+void ContactStages::stand_at(double shift, int a, ContactPolygon* polygon) {
+  if (a >= -1) {
+    polygon->shift = shift;
+    return;
+  }
+  Partner& wall = partner(-1 - a);
+  polygon->offset += wall.shift - shift;
+  polygon->shift = 0;
+  wall.shift = shift;
+}
+
+// The same of a listed contact that is a point, in the results of this step.
+void ContactStages::stand_at(double shift, int a, int lane, Results* results) {
+  Partner& wall = partner(-1 - a);
+  const double way = shift - wall.shift;
+  wall.shift = shift;
+  results->gap[lane] += way;
+  results->touching[lane] = results->gap[lane] < 0;
+  for (int k = 0; k < 3; ++k) results->point[k][lane] -= 0.5 * way * results->normal[k][lane];
+}
+
 // That energy to a polygon, by its factor or its shift; its state then.
 PolygonState ContactStages::give(ContactPolygon* polygon, int a, int b, double energy,
-                                 const PointMemories& memory) const {
-  if (step_.model != nullptr) return give_model(polygon, a, b, energy, memory.data());
-  const Vec3 wall = wall_frame(a);
-  return give_energy(energy, kStiffest, placed(*step_.bodies, wall, a), placed(*step_.bodies, wall, b),
-                     polygon);
+                                 const PointMemories& memory) {
+  const double before = a < -1 ? wall_shift(a) : polygon->shift;
+  stand_at(0, a, polygon);
+  polygon->shift = before;  // where the search for it begins
+  PolygonState state;
+  if (step_.model != nullptr) {
+    state = give_model(polygon, a, b, energy, memory.data());
+  } else {
+    const Vec3 wall = wall_frame(a);
+    state = give_energy(energy, kStiffest, placed(*step_.bodies, wall, a), placed(*step_.bodies, wall, b),
+                        polygon);
+  }
+  stand_at(polygon->shift, a, polygon);
+  return state;
 }
 
 // Energy that left the springs.
@@ -183,18 +214,19 @@ bool ContactStages::make_flat(ContactBlock& block, int lane, const Results& sing
                                                          : 0.5 * geometry.overlap * geometry.overlap);
   PointMemories memory{};
   if (step_.model != nullptr) memory.fill(pool_.memory(block, lane));
-  if (a >= -1)
-    state = give(&polygon, a, b, energy, memory);
-  else
-    polygon.factor = continuity_factor(energy, energy_of(polygon, state, a, b, memory));
-  if (!(polygon.factor < kStiffest)) return false;
+  const double stood_back = wall_shift(a);
+  state = give(&polygon, a, b, energy, memory);
+  if (!(polygon.factor < kStiffest)) {
+    stand_at(a < -1 ? stood_back : 0, a, &polygon);
+    return false;
+  }
 
   ContactState old;
   block.get(lane, kStateField, kContactStateSize, &old);
   // A contact that begins with an overlap of a few digits holds nothing, and the ratio is round-off's.
   if (old.active == 0 && single.shift[lane] == 0 && overlap < kFewDigits * record(b).radius) {
     polygon.factor = 1;
-    polygon.shift = 0;
+    stand_at(0, a, &polygon);
     state = now(polygon, *step_.bodies, wall_frame(a), a, b);
   }
   FlatContact& flat = pool_.add_flat(block.proof[lane]->contact);
@@ -379,10 +411,7 @@ bool ContactStages::remake(ContactBlock& block, int lane, FlatContact& flat, Pol
   const double holds = energy_of(polygon, fresh, a, b, memory);
   // What would make the springs too stiff they lose, which is booked.
   const double kept = kept_energy(flat, state, polygon, fresh, a, b, memory, holds);
-  if (a >= -1)
-    fresh = give(&polygon, a, b, kept, memory);
-  else if (holds > 0)
-    polygon.factor = std::min(polygon.factor * kept / holds, std::max(kStiffest, polygon.factor));
+  fresh = give(&polygon, a, b, kept, memory);
   if (step_.model != nullptr) {
     remake_model(flat, polygon, source);
     state = fresh;
@@ -472,6 +501,7 @@ ContactStages::LeftPolygon ContactStages::leave_flat(ContactBlock& block, int la
 // normal. What its springs hold less than the polygon's did is booked.
 void ContactStages::settle_left(ContactBlock& block, int lane, Results& results, const LeftPolygon& left) {
   const int a = block.a[lane], b = block.b[lane];
+  if (a < -1) stand_at(0, a, lane, &results);
   const bool touching = results.touching[lane] != 0;
   ContactGeometry g = results.geometry(lane);
   const double overlap = -results.gap[lane], kn = step_.model != nullptr ? 0 : step_.laws[block.law[lane]].kn;
@@ -484,11 +514,15 @@ void ContactStages::settle_left(ContactBlock& block, int lane, Results& results,
   if (touching)
     held += std::clamp(unit(arrival(a, b, g.normal, g.arm_a, g.arm_b)), 0.0, std::max(0.0, full - held));
   double &weight = block.field[kWeight][lane], &shift = block.field[kShift][lane];
-  weight = full > 0 ? std::clamp(held / full, a < -1 ? kSoftest : 1, kStiffest) : 1;
+  weight = full > 0 ? std::clamp(held / full, 1.0, kStiffest) : 1;
   shift = 0;
-  if (full > 0 && weight > held / full && a >= -1)
+  if (full > 0 && weight > held / full)
     shift =
         overlap - (step_.model != nullptr ? overlap_holding(held, overlap, unit) : std::sqrt(2 * held / kn));
+  if (a < -1) {
+    stand_at(shift, a, lane, &results);
+    shift = 0;
+  }
   results.shift[lane] = shift;
   if (step_.model != nullptr) return;
   double energy = held + left.tangential_energy;

@@ -21,8 +21,6 @@ constexpr double kLasting = 12;    // rad of a contact's oscillation: a bounce, 
                                    // a factor falls then without rest too, as that takes energy out only
 constexpr double kArrival = 1.1;   // ways of a step that a contact which begins at its surface is deep
 constexpr double kStiffest = 8;    // factor or weight of a contact; four is what a corner needs
-constexpr double kSoftest = 1e-3;  // weight of one whose polygon held nothing over its part of a mesh's
-                                   // plane, beside which the body's deepest point may lie
 
 // How a contact moves beside its own oscillation, whose frequency is the root of force over overlap and
 // reduced mass (by the sum of the inverse masses): by the last step's rate and this one's.

@@ -177,6 +177,43 @@ TEST(OuterFeatures, cuts_of_faces_and_edges_change_nothing) {
   }
 }
 
+// Forces derive from the gap: as a body turns about its centre, the gap changes as the contact's place and
+// normal say. Faces and straight sides on a vertex had their contact at any of their points: of the bodies
+// here 450 of 2,200, and a cube that fell on a spike flew off with 260 times its energy.
+TEST(OuterFeatures, contacts_are_where_the_gap_says) {
+  constexpr double kTurn = 1e-6;
+  Random random(6);
+  const auto list = bodies(random);
+  std::vector<Wall> walls = {cube(1)};
+  for (int k = 0; k < 4; ++k) walls.push_back(polyhedron(random));
+  int judged = 0, off = 0;
+  for (int k = 0; k < 2200; ++k) {
+    const auto& [name, shape] = list[k % list.size()];
+    const Wall& wall = walls[random.below(static_cast<int>(walls.size()))];
+    ContactResult truth;
+    const Particle body = place(random, *shape, wall, k % 3, -1e-3, &truth);
+    const SurfaceContacts found = contacts(body, wall.triangles);
+    if (found.count != 1 || found.contact[0].flat) continue;  // faces on faces: the gap has a kink
+    const double radius = body.scale * shape->bounding_radius;
+    const Vec3 axis = random.direction();
+    double gap[2];
+    bool one = true;
+    for (int i = 0; i < 2; ++i) {
+      Particle turned = body;
+      turned.q = Quat(Eigen::AngleAxisd(i == 0 ? -kTurn : kTurn, axis)) * body.q;
+      const SurfaceContacts there = contacts(turned, wall.triangles);
+      one = one && there.count == 1;
+      gap[i] = there.contact[0].gap;
+    }
+    if (!one) continue;
+    const SurfaceContact& c = found.contact[0];
+    ++judged;
+    off += std::abs((gap[1] - gap[0]) / (2 * kTurn) - c.normal.dot(axis.cross(c.on_body))) > 1e-3 * radius;
+  }
+  EXPECT_GT(judged, 2000);
+  EXPECT_EQ(off, 0);
+}
+
 // Corners and edges of bodies on corners and edges of walls, where the shortest way out of the body leads
 // into the wall as often as not: of boxes on cubes and tetrahedra 1 in 70 had no contact, and 1 in 13 only a
 // deeper one. Few are left. Apart, also bodies much larger than the wall have none.

@@ -335,6 +335,74 @@ class BentMeshes(unittest.TestCase):
         t = result.thermo
         return t["ke"] + t["er"] + t["mgz"] * gravity / 9.81 + t["led[1]"] + t["led[2]"]
 
+    def test_spikes_throw_nothing_back_faster(self):
+        """Faces, rims and straight sides that fall on spikes: the force acts at the spike. At some corner or end of what lies on it, it
+        turned the body the wrong way, and a cube flew off with up to 260 times its energy, a tablet with 3,500 times."""
+        random = np.random.default_rng(5)
+        count, apart, spikes, atoms, velocities = 12, 0.2, [], [], []
+        for k in range(count):
+            x, y, w = apart * (k % 4), apart * (k // 4), 0.05
+            foot = [(x + w * a, y + w * b, -0.05) for a, b in ((-1, -1), (1, -1), (1, 1), (-1, 1))]
+            spikes += [(foot[i], foot[(i + 1) % 4], (x, y, 0.0)) for i in range(4)]
+            turn = random.normal(size=4)
+            atoms.append((k + 1, 1, 1, 0.04, 2500.0, x + random.uniform(-0.01, 0.01), y + random.uniform(-0.01, 0.01), 0.09,
+                          *(turn / np.linalg.norm(turn))))
+            velocities.append((k + 1, 0, 0, -1.0, 0, 0, 0))
+        for body in (deck.box_shape(1, 0.9, 0.8), deck.shape_file("tablet", 1, height=1, rim=0.2), deck.shape_file("capsule", 0.6, length=0.9)):
+            out = run("mesh m", atoms, velocities, mesh=spikes, body=body, before=MESH, law="kn 1e6 kt 0 mu 0", gravity=None, dt=5e-6,
+                      steps="run 16000", thermo="c_ke c_er", box=((-1, 2), (-1, 2), (-1, 1)))
+            energy = out.thermo["ke"] + out.thermo["er"] + out.thermo["led[1]"]
+            self.assertGreater(out.thermo["er"][-1], 0.02 * energy[0])  # they were met beside their centres
+            np.testing.assert_allclose(energy / energy[0], 1, rtol=0, atol=2e-3)
+
+    def test_contacts_with_ends_of_a_drum_keep_their_stiffness(self):
+        """Tablets at the border between a drum's end and its shell, one mesh: contacts that pass from several points to one and back
+        held next to nothing once, and stayed a thousand times too soft, to depths of 19 % of the size."""
+        n, radius, half = 48, 0.02, 0.01
+        nine = lambda x: float(f"{x:.9g}")  # noqa: E731
+        at = lambda k, z: (nine(radius * np.cos(2 * np.pi * (k % n) / n)), nine(radius * np.sin(2 * np.pi * (k % n) / n)), z)  # noqa: E731
+        drum = []
+        for k in range(n):
+            drum += [(at(k, -half), at(k + 1, -half), at(k + 1, half)), (at(k, -half), at(k + 1, half), at(k, half)),
+                     ((0, 0, -half), at(k + 1, -half), at(k, -half)), ((0, 0, half), at(k, half), at(k + 1, half))]
+        for seed in (49979687, 15485867):
+            out = deck.run_ok(f"""units si
+newton off
+communicate single vel yes
+atom_style nurbs tablet.json
+boundary f f f
+region box block -0.025 0.025 -0.025 0.025 -0.015 0.015 units box
+create_box 1 box
+neighbor 1e-3 bin
+neigh_modify delay 0
+fix E all property/global youngsModulus peratomtype 5e6
+fix nu all property/global poissonsRatio peratomtype 0.3
+fix e all property/global coefficientRestitution peratomtypepair 1 0.5
+fix mu all property/global coefficientFriction peratomtypepair 1 0.5
+pair_style gran/nurbs model hertz tangential history
+pair_coeff * *
+fix drum all mesh/surface file drum.stl type 1
+fix wall all wall/nurbs mesh drum type 1 model hertz tangential history
+fix gravity all gravity 9.81 vector 0 -1 0
+fix motion all nve/nurbs
+timestep 2e-5
+fix grain all particletemplate/nurbs 86028121 atom_type 1 density constant 2500 shape tablet scale constant 1
+fix shares all particledistribution/discrete 67867967 1 grain 1.0
+region inside cylinder z 0 0 0.019 -0.009 0.009 units box
+fix fill all insert/pack seed {seed} distributiontemplate shares insert_every once overlapcheck yes all_in yes particles_in_region 100 region inside
+compute stats all nurbs/stats
+fix deep all ave/time 1 1000 1000 c_stats[11]
+thermo_style custom step atoms ke f_deep
+thermo 1000
+run 5000
+unfix fill
+fix turn all move/mesh mesh drum rotate origin 0 0 0 axis 0 0 1 period 0.5
+run 13000
+""", files={"tablet.json": deck.shape_file("tablet", 0.002, height=0.002, rim=0.0004), "drum.stl": stl(drum)}, timeout=300)
+            self.assertEqual(out.thermo["Atoms"][-1], 100)
+            self.assertEqual(np.sum(out.thermo["deep"]), 0)
+            self.assertNotIn("as deep as", out.screen)
+
     def test_nothing_is_gained(self):
         for seed, height, n in ((0, 1e-4, 8), (1, 1e-3, 20), (0, 1e-2, 6), (1, 1e-2, 6)):
             for law, before in (("kn 1e5 kt 5e4 mu 0", ""), ("type 1 model hertz tangential no_history", self.HERTZ)):

@@ -73,7 +73,7 @@ class ConeSearch {
       else if (!halve(top))
         return last();
     }
-    if (best_ >= 0) return feature_contact(looks_[best_].at, looks_[best_].d);
+    if (best_ >= 0) return over_vertex(looks_[best_]);
     FeatureContact none;
     none.touching = true;
     none.gap = -kFarAway;
@@ -126,6 +126,14 @@ class ConeSearch {
     looks_.push_back(l);
     if (best_ < 0 || l.at.gap > looks_[best_].at.gap) best_ = static_cast<int>(looks_.size()) - 1;
     return l.at.gap < 0;
+  }
+
+  // Of the supports at the maximum some mean lies over the vertex, along d, and d is its normal; of a face or a
+  // straight side, any point of which may have been found, it is the place that is pressed.
+  FeatureContact over_vertex(const Look& best) const {
+    FeatureContact c = feature_contact(best.at, best.d);
+    c.on_body = a_ - particle_.x + c.gap * c.normal;
+    return c;
   }
 
   FeatureContact last() const { return feature_contact(looks_.back().at, looks_.back().d); }
