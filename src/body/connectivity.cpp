@@ -58,7 +58,7 @@ double closest_parameter(const BezierPatch& patch, int edge, const Vec3& x) {
   return best;
 }
 
-constexpr double kOnCurve = 1e-12;  // of an edge's chord: what is no further away lies on the edge
+constexpr double kOnCurve = 1e-12;     // of an edge's chord: what is no further away lies on the edge
 constexpr double kNoGap = 1e-6;        // of the tolerance: sides so near have the same parameters
 constexpr double kNotByChance = 1e-2;  // share of a gap that better parameters leave
 constexpr double kShortGap = 1e-3;     // of a short edge: what its partner may be off

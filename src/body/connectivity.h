@@ -48,9 +48,10 @@ inline double partner_parameter(const EdgeLink& link, double t) {
   return link.ratio == 1 ? s : std::min(1.0, link.ratio * s / (1 + (link.ratio - 1) * s));
 }
 
-// The same where the parameter has to be looked for: that of the point of the partner's edge closest to x. Some
-// 5 us; 0.2 us where Gauss-Newton from `guess`, if there is one, comes on to x.
-double projected_parameter(const BezierPatch& partner, const EdgeLink& link, const Vec3& x, double guess = -1);
+// The same where the parameter has to be looked for: that of the point of the partner's edge closest to x.
+// Some 5 us; 0.2 us where Gauss-Newton from `guess`, if there is one, comes on to x.
+double projected_parameter(const BezierPatch& partner, const EdgeLink& link, const Vec3& x,
+                           double guess = -1);
 
 // The parameter of an edge's point closest to x, by Gauss-Newton from one near it.
 double closest_on_edge(const BezierPatch& patch, int edge, const Vec3& x, double from);

@@ -503,7 +503,8 @@ void ContactStages::compute_block(ContactBlock& block) {
       const bool first = results.touching[lane] != 0 && block.field[kStateField][lane] == 0;
       if (first && may_be_flat(a, b) && make_flat(block, lane, results)) continue;
       start_run(block, lane, results);
-      if (results.touching[lane] != 0 && sign(block, lane) > 0) note_depth(a, b, results.gap[lane] - wall_shift(a));
+      if (results.touching[lane] != 0 && sign(block, lane) > 0)
+        note_depth(a, b, results.gap[lane] - wall_shift(a));
       continue;
     }
     if (results.touching[lane] != 0) {

@@ -331,9 +331,9 @@ bool ContactStages::serve_flat(ContactBlock& block, int lane, LeftPolygon* left)
   return true;
 }
 
-// Towards the polygon's own stiffness and place, where it rests; to its stiffness from a greater one also where
-// it lasts: what towers and shaken beds stand on would stay four times as stiff as the law, and as their step
-// is for. What the springs give up or get is booked.
+// Towards the polygon's own stiffness and place, where it rests; to its stiffness from a greater one also
+// where it lasts: what towers and shaken beds stand on would stay four times as stiff as the law, and as
+// their step is for. What the springs give up or get is booked.
 void ContactStages::relax_polygon(const ContactBlock& block, int lane, const ContactRest& rest,
                                   FlatContact& flat, PolygonState* state) {
   flat.polygon.age += static_cast<float>(rest.phase);

@@ -17,10 +17,10 @@ constexpr double kRelaxation = 0.1;
 // Of the speed and the acceleration of an oscillation as wide as its overlap, that a contact at rest has:
 // small against both, whatever the time step. One that turns back in a bounce has the acceleration.
 constexpr double kResting = 0.02;
-constexpr double kLasting = 12;    // rad of a contact's oscillation: a bounce, which has pi, is over by then;
-                                   // a factor falls then without rest too, as that takes energy out only
-constexpr double kArrival = 1.1;   // ways of a step that a contact which begins at its surface is deep
-constexpr double kStiffest = 8;    // factor or weight of a contact; four is what a corner needs
+constexpr double kLasting = 12;   // rad of a contact's oscillation: a bounce, which has pi, is over by then;
+                                  // a factor falls then without rest too, as that takes energy out only
+constexpr double kArrival = 1.1;  // ways of a step that a contact which begins at its surface is deep
+constexpr double kStiffest = 8;   // factor or weight of a contact; four is what a corner needs
 
 // How a contact moves beside its own oscillation, whose frequency is the root of force over overlap and
 // reduced mass (by the sum of the inverse masses): by the last step's rate and this one's.

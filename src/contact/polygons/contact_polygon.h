@@ -19,11 +19,11 @@
 //     nothing.
 //  2. Hand-over: give_energy(U before / kn, ..) keeps U continuous. A polygon that would hold less is stiffer
 //     by its factor (a corner that comes down flat: up to 4), and relax(polygon, state, dt / time) brings
-//     that to 1 over some periods of a contact that rests or lasts, and returns the work / kn that this puts into the springs, <
-//     0, to be booked. In one that would hold more the reference plane stands back by a shift, in which
-//     nothing is felt: it is as stiff as any other and gives back what it took, where a small factor would
-//     let bodies sink into each other. The shift goes under bodies at rest. A contact that opens (U = 0)
-//     starts again.
+//     that to 1 over some periods of a contact that rests or lasts, and returns the work / kn that this puts
+//     into the springs, < 0, to be booked. In one that would hold more the reference plane stands back by a
+//     shift, in which nothing is felt: it is as stiff as any other and gives back what it took, where a small
+//     factor would let bodies sink into each other. The shift goes under bodies at rest. A contact that opens
+//     (U = 0) starts again.
 //  3. Every step: evaluate, then judge.
 //     keep:   forces from the state.
 //     open:   no point overlaps. Back to the single point and to 1.

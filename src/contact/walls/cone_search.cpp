@@ -128,8 +128,8 @@ class ConeSearch {
     return l.at.gap < 0;
   }
 
-  // Of the supports at the maximum some mean lies over the vertex, along d, and d is its normal; of a face or a
-  // straight side, any point of which may have been found, it is the place that is pressed.
+  // Of the supports at the maximum some mean lies over the vertex, along d, and d is its normal; of a face or
+  // a straight side, any point of which may have been found, it is the place that is pressed.
   FeatureContact over_vertex(const Look& best) const {
     FeatureContact c = feature_contact(best.at, best.d);
     c.on_body = a_ - particle_.x + c.gap * c.normal;

@@ -62,9 +62,9 @@ bool find_only_way_out(const Particle& particle, const Vec3& a, const Vec3& gues
 
 // The highest of f over the directions d with edge . d <= 0 for all `edges` of a vertex `a`, whatever other
 // maxima there are; of those not above `level` (< 0) any. Branch and bound over spherical triangles, some 60
-// support searches. The gap is right to 1e-9 of itself; on_body is the point over `a`, which the body has there
-// if f is highest inside the cone. Not touching, `normal` is a direction of the cone
-// with f >= 0; where the cone has none, the gap is -kFarAway.
+// support searches. The gap is right to 1e-9 of itself; on_body is the point over `a`, which the body has
+// there if f is highest inside the cone. Not touching, `normal` is a direction of the cone with f >= 0; where
+// the cone has none, the gap is -kFarAway.
 FeatureContact find_highest_point_contact(const Particle& particle, const Vec3& a, const Vec3* edges,
                                           int count, double level, const SurfacePoint* start);
 
