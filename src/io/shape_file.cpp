@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 #include <filesystem>
 #include <fstream>
 #include <limits>
@@ -155,6 +156,16 @@ std::string position(const std::string& text, size_t byte) {
   return "byte " + std::to_string(byte) + " (line " + std::to_string(lines + 1) + ")";
 }
 
+// What makes a shape of a mesh or a CAD file, which this text may be.
+std::string maker_of(const std::string& text) {
+  const auto begins = [&](const char* word) { return text.compare(0, std::strlen(word), word) == 0; };
+  if (begins("solid") || begins("ply") || begins("v ") || begins("# ") || begins("o "))
+    return "; of a mesh, 'nurbs-shape fit' makes a shape";
+  if (begins("ISO-10303") || begins("DBRep_DrawableShape"))
+    return "; of a solid, 'nurbs-shape import' makes a shape";
+  return "";
+}
+
 Json parse_json(const std::string& text, const Place& place) {
   constexpr int kDeepest = 64;  // quotes and destructors go down by recursion
   if (text.find_first_not_of(" \t\r\n") == std::string::npos) place.fail("the file is empty");
@@ -166,7 +177,7 @@ Json parse_json(const std::string& text, const Place& place) {
   } catch (const Json::parse_error& error) {
     const bool at_end = error.byte > text.size();
     place.fail("not valid JSON at " + position(text, error.byte) +
-               (at_end ? ": the file ends too early" : ": unexpected character"));
+               (at_end ? ": the file ends too early" : ": unexpected character" + maker_of(text)));
   } catch (const Json::exception&) {
     place.fail("not valid JSON: a number is out of range");
   }

@@ -251,7 +251,9 @@ void HostModels::build(int narg, char** arg) {
       choice("model", kNormal, {"off", host::NORMAL_OFF}), choice("tangential", kTangential, kTangential[0]),
       choice("cohesion", kCohesion, kCohesion[0]), choice("rolling_friction", kRolling, kRolling[0])};
   if (narg == 0 || std::strcmp(arg[0], "model") != 0)
-    fail_all(FLERR, lmp_, user_ + ": the contact model must begin with model NORMAL");
+    fail_all(FLERR, lmp_,
+             user_ + ": the contact model must begin with model NORMAL" +
+                 (narg > 0 && std::strcmp(arg[0], "kn") == 0 ? "; kn .. stands without a type" : ""));
   for (Choice& c : choices) {
     if (narg == 0 || std::strcmp(arg[0], c.kind) != 0) continue;
     const std::string name = narg > 1 ? arg[1] : "";

@@ -452,7 +452,7 @@ void ContactStages::run_flat(ContactBlock& block, int lane, FlatContact& flat, c
   Results results;
   fill(flat.polygon, state, offset(a, b), &flat.points, &results);
   flat.beyond = stored_energy(flat.polygon, state);
-  note_depth(a, b, state.least - flat.polygon.shift);
+  note_depth(a, b, state.least - flat.polygon.shift - wall_shift(a));
   for (int k = 0; k < state.count; ++k) {
     if (step_.setup)
       start_run(flat.points, k, results);

@@ -234,7 +234,9 @@ TEST(ShapeFileErrors, MissingFileAndFolder) {
 
 TEST(ShapeFileErrors, NotJson) {
   EXPECT_EQ(parse_error("solid cube\nfacet"),
-            "stone.json: not valid JSON at byte 1 (line 1): unexpected character");
+            "stone.json: not valid JSON at byte 1 (line 1): unexpected character; of a mesh, 'nurbs-shape "
+            "fit' makes a "
+            "shape");
   EXPECT_EQ(parse_error("{\"shape\":\n {]"),
             "stone.json: not valid JSON at byte 13 (line 2): unexpected character");
   EXPECT_EQ(parse_error("[1e999]"), "stone.json: not valid JSON: a number is out of range");

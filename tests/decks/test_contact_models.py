@@ -614,7 +614,7 @@ class BadInput(unittest.TestCase):
         wall = "type 1  model hertz tangential history"
         self.assertIn(wall, good)
         for words, parts in {"model hertz": ("type T", ), "type 3 model hertz": ("type = 3", "[1, 1]"),
-                             "type 1 model hurtz": ("model hurtz", ), "type 1": ("must begin with model", ),
+                             "type 1 model hurtz": ("model hurtz", ), "type 1": ("must begin with model", ), "type 1 kn 1e5 kt 1e5 mu 0": ("stands without a type", ),
                              "type x model hertz": ("type = x", )}.items():
             with self.subTest(words):
                 self.expect(good.replace(wall, words), files, "Fix wall/nurbs", *parts)
