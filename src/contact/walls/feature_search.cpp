@@ -422,6 +422,28 @@ bool is_clear_of(const Particle& particle, const Vec3* points, int count) {
   return false;
 }
 
+// Gilbert, Johnson & Keerthi's distance of the point from the body's points in that plane, which are the
+// supports along directions next to d.
+bool has_point(const Particle& particle, const Vec3& point, const Vec3& d, const SurfacePoint& at) {
+  constexpr double kTilt = 1e-6, kNear = 1e-4, kProgress = 0.1;
+  const double near = kNear * particle.scale * particle.shape->bounding_radius;
+  Vec3 simplex[4], y = particle.x - point + gap_along(particle, point, d, &at).on_body;
+  int size = 0;
+  simplex[size++] = y;
+  for (int k = 0; k < kApartSteps && size < 4; ++k) {
+    const Vec3 along = y - d.dot(y) * d;
+    const double distance = along.norm();
+    if (distance < near) return true;
+    const Vec3 to = along / distance;
+    const Vec3 q =
+        particle.x - point + gap_along(particle, point, (d + kTilt * to).normalized(), &at).on_body;
+    if (distance - q.dot(to) < kProgress * near) return false;
+    simplex[size++] = q;
+    y = nearest_to_origin(simplex, &size);
+  }
+  return size == 4;
+}
+
 namespace {
 
 FeatureContact find_way_out(const Particle& particle, const Vec3& a, const ContactSettings& settings) {

@@ -72,6 +72,11 @@ FeatureContact find_highest_point_contact(const Particle& particle, const Vec3& 
 // not said of bodies that all but touch it.
 bool is_clear_of(const Particle& particle, const Vec3* points, int count);
 
+// Whether the body has a point where it touches its supporting plane with inward normal d: whether the
+// contact of a vertex below, found as highest of some directions only, is the highest of those beside them
+// too. To 1e-4 of its size; some support searches, one for round bodies. `at` is the body's support there.
+bool has_point(const Particle& particle, const Vec3& point, const Vec3& d, const SurfacePoint& at);
+
 // f(d) along a unit direction, with the body's support point.
 struct FeatureGap {
   double gap;

@@ -341,12 +341,14 @@ bool SurfaceSearch::touch_outer_vertex(int number, const Vec3& guess) {
   bool own = find_only_way_out(particle_, v.x, guess, from, &f);
   if (!own || (!f.touching && !is_normal(f.normal))) {
     f = find_highest_point_contact(particle_, v.x, ways.data(), static_cast<int>(ways.size()), most, from);
-    // Where f is highest at the border of the normals and goes on to rise, an edge has the contact.
+    // Where f is highest at the border of the normals and goes on to rise, an edge has the contact; it may go
+    // on along a crease only, as where the body's edge crosses one of the vertex's beyond its other end.
     const auto goes_on = [&](const Vec3& e) {
       return e.dot(f.normal) > -kBorder &&
              gap_along(particle_, v.x, (f.normal + 10 * kBorder * e).normalized(), &f.where).gap > f.gap;
     };
-    own = f.touching && f.gap > most && std::none_of(ways.begin(), ways.end(), goes_on) && meets(v);
+    own = f.touching && f.gap > most && std::none_of(ways.begin(), ways.end(), goes_on) && meets(v) &&
+          has_point(particle_, particle_.x + f.on_body, f.normal, f.where);
   }
   if (!f.touching) most = kFarAway;  // nor are its pieces, where a normal parts the body from all of them
   int best = -1;
