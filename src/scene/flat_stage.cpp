@@ -125,7 +125,7 @@ void ContactStages::stand_at(double shift, int a, int lane, Results* results) {
 // That energy to a polygon, by its factor or its shift; its state then.
 PolygonState ContactStages::give(ContactPolygon* polygon, int a, int b, double energy,
                                  const PointMemories& memory) {
-  const double before = a < -1 ? wall_shift(a) : polygon->shift;
+  const double before = polygon->shift + wall_shift(a);
   stand_at(0, a, polygon);
   polygon->shift = before;  // where the search for it begins
   PolygonState state;
@@ -187,7 +187,7 @@ bool ContactStages::make_flat(ContactBlock& block, int lane, const Results& sing
   const int a = block.a[lane], b = block.b[lane];
   const Vec3 normal = single.normal_of(lane);
   double before[3];
-  block.get(lane, kStateField + 3, 3, before);
+  block.get(lane, kStateNormal, 3, before);
   const double overlap = -single.gap[lane],
                last_overlap = block.field[kStateField + 2][lane] + single.shift[lane];
   const double way = clear_way(a, b, &block.until[lane]);
@@ -217,7 +217,7 @@ bool ContactStages::make_flat(ContactBlock& block, int lane, const Results& sing
   const double stood_back = wall_shift(a);
   state = give(&polygon, a, b, energy, memory);
   if (!(polygon.factor < kStiffest)) {
-    stand_at(a < -1 ? stood_back : 0, a, &polygon);
+    stand_at(stood_back, a, &polygon);
     return false;
   }
 

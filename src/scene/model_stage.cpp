@@ -193,7 +193,7 @@ PolygonState ContactStages::give_model(ContactPolygon* polygon, int a, int b, do
   const double all = std::max(0.0, -state.least);
   if (!(energy > 0)) return at(all);
   if (!(held > 0)) return state;
-  polygon->factor = std::clamp(energy / held, 1.0, most);
+  polygon->factor = std::clamp(continuity_factor(energy, held), 1.0, most);
   if (energy >= (1 - kSameEnergy) * held) return state;
   const double wanted = std::pow(energy, kPower);
   double low = 0, high = all, at_low = std::pow(held, kPower), at_high = 0;

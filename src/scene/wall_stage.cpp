@@ -59,8 +59,9 @@ Vec3 ContactStages::listed_normal(std::int32_t number) const {
   const int lane = ContactPool::lane(number);
   if (const FlatContact* flat = pool_.flat_of(block, lane)) return load(flat->polygon.normal);
   if (block.field[kStateField][lane] == 0) return load(partner(number).normal);
-  return {block.field[kStateNormal][lane], block.field[kStateNormal + 1][lane],
-          block.field[kStateNormal + 2][lane]};
+  double normal[3];
+  block.get(lane, kStateNormal, 3, normal);
+  return load(normal);
 }
 
 int ContactStages::former(std::int32_t head, FormerContact* contacts, PairMemory* memories) const {

@@ -193,6 +193,14 @@ def data_file(atoms, velocities=(), box=((-10, 10), (-10, 10), (-10, 10)), types
     return "\n".join(lines) + "\n"
 
 
+def materials(youngs=5e6, restitution=0.5, friction=0.5):
+    """The properties of one atom type that `model hertz tangential history` wants."""
+    return f"""fix E all property/global youngsModulus peratomtype {youngs!r}
+fix nu all property/global poissonsRatio peratomtype 0.3
+fix e all property/global coefficientRestitution peratomtypepair 1 {restitution!r}
+fix mu all property/global coefficientFriction peratomtypepair 1 {friction!r}"""
+
+
 def shape_file(kind, *sizes, **options):
     """Text of a shape file made by `nurbs-shape make KIND`: `sizes` are three semi-axes or one radius, `options` the rest."""
     arguments = ["make", kind]

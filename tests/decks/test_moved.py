@@ -123,10 +123,7 @@ set group all nurbs/scale 2.5e-3
 set group all quat/random 86028121
 neighbor 1e-3 bin
 neigh_modify delay 0
-fix E all property/global youngsModulus peratomtype 2e6
-fix nu all property/global poissonsRatio peratomtype 0.3
-fix e all property/global coefficientRestitution peratomtypepair 1 0.5
-fix mu all property/global coefficientFriction peratomtypepair 1 0.5
+""" + deck.materials(2e6) + """
 pair_style gran/nurbs model hertz tangential history
 pair_coeff * *
 """

@@ -57,10 +57,7 @@ region box block -0.06 0.06 -0.06 0.06 -0.01 0.12 units box
 create_box 1 box
 neighbor 2e-3 bin
 neigh_modify delay 0
-fix E all property/global youngsModulus peratomtype 5e6
-fix nu all property/global poissonsRatio peratomtype 0.3
-fix e all property/global coefficientRestitution peratomtypepair 1 0.5
-fix mu all property/global coefficientFriction peratomtypepair 1 0.5
+{deck.materials()}
 fix silo all mesh/surface file silo.stl type 1
 fix gravity all gravity 9.81 vector 0 0 -1
 """

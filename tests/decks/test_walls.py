@@ -375,10 +375,7 @@ region box block -0.025 0.025 -0.025 0.025 -0.015 0.015 units box
 create_box 1 box
 neighbor 1e-3 bin
 neigh_modify delay 0
-fix E all property/global youngsModulus peratomtype 5e6
-fix nu all property/global poissonsRatio peratomtype 0.3
-fix e all property/global coefficientRestitution peratomtypepair 1 0.5
-fix mu all property/global coefficientFriction peratomtypepair 1 0.5
+{deck.materials()}
 pair_style gran/nurbs model hertz tangential history
 pair_coeff * *
 fix drum all mesh/surface file drum.stl type 1
@@ -752,10 +749,7 @@ region box block -0.009 0.009 -0.009 0.009 -0.02 0.02 units box
 create_box 1 box
 neighbor 5e-4 bin
 neigh_modify delay 0
-fix E all property/global youngsModulus peratomtype 5e6
-fix nu all property/global poissonsRatio peratomtype 0.3
-fix e all property/global coefficientRestitution peratomtypepair 1 0.5
-fix mu all property/global coefficientFriction peratomtypepair 1 0.4
+{deck.materials(friction=0.4)}
 pair_style gran/nurbs model hertz tangential history
 pair_coeff * *
 fix cyl all wall/nurbs cylinder z 0.006 0 0 {model} move rotate origin 0 0 0 axis 0 0 1 period 0.2

@@ -188,7 +188,7 @@ PolygonState give_energy(double energy, double stiffest, const BodyFrame& a, con
     return evaluate(*polygon, a, b);
   }
   if (!(whole.energy > 0)) return whole;
-  polygon->factor = std::clamp(energy / whole.energy, 1.0, most);
+  polygon->factor = std::clamp(continuity_factor(energy, whole.energy), 1.0, most);
   if (energy >= whole.energy) return whole;
   polygon->shift = std::clamp(kept, 0.0, -whole.least);
   PolygonState state = evaluate(*polygon, a, b);
