@@ -62,11 +62,20 @@ def actor(data, color=None, opacity=1.0, ambient=0.25, diffuse=0.75, specular=0.
     return shown
 
 
-def stl_actor(file):
+def stl_actor(file, top=np.inf):
+    """A wall, up to the height `top`."""
     reader = vtk.vtkSTLReader()
     reader.SetFileName(str(file))
-    reader.Update()
-    return actor(reader.GetOutput(), color=(0.6, 0.65, 0.7), opacity=0.25)
+    shown = reader
+    if np.isfinite(top):
+        plane = vtk.vtkPlane()
+        plane.SetOrigin(0, 0, top)
+        plane.SetNormal(0, 0, -1)
+        shown = vtk.vtkClipPolyData()
+        shown.SetInputConnection(reader.GetOutputPort())
+        shown.SetClipFunction(plane)
+    shown.Update()
+    return actor(shown.GetOutput(), color=(0.6, 0.65, 0.7), opacity=0.25)
 
 
 def grab(renderer, size, samples=8):
@@ -86,8 +95,9 @@ def grab(renderer, size, samples=8):
     return vtk_to_numpy(output.GetPointData().GetScalars()).reshape(height, width, -1)[::-1]
 
 
-def draw(vtu, png, towards=(0, -1, 0.35), walls=(), keep=None, size=(700, 700), zoom=1.25):
-    """`towards`: from the bed to the eye. `keep`: which bodies, by their centre (the mean of their patches)."""
+def draw(vtu, png, towards=(0, -1, 0.35), walls=(), top=np.inf, keep=None, size=(700, 700), zoom=1.25):
+    """`towards`: from the bed to the eye. `walls`: STL files, drawn up to the height `top`. `keep`: which bodies, by their
+    centre (the mean of their patches)."""
     bodies = {}
     for patch in read_patches(read_grid(vtu)):
         bodies.setdefault(int(patch.data["id"][0]), []).append(patch)
@@ -97,7 +107,7 @@ def draw(vtu, png, towards=(0, -1, 0.35), walls=(), keep=None, size=(700, 700), 
     renderer.SetBackground(1, 1, 1)
     renderer.AddActor(actor(surface_of(shown)))
     for wall in walls:
-        renderer.AddActor(stl_actor(wall))
+        renderer.AddActor(stl_actor(wall, top))
     camera = renderer.GetActiveCamera()
     camera.SetPosition(*towards)
     camera.SetFocalPoint(0, 0, 0)

@@ -50,18 +50,26 @@ def main(folder):
         axes[0].plot(*discharge(runs[s][0]), label=f"a/b {ASPECT[s]}")
     axes[0].set_xlabel("time, s")
     axes[0].set_ylabel("grains above the orifice")
+    axes[0].set_ylim(0, None)
     axes[0].legend()
-    value, error = (np.array([rates[s][k] for s in shapes]) / rates["sphere"][0] for k in (0, 1))
-    axes[1].errorbar([ASPECT[s] for s in shapes], value, error, fmt="o", capsize=3)
+    value, error = (np.array([rates[s][k] for s in shapes]) for k in (0, 1))
+    for s in shapes:
+        axes[1].plot([ASPECT[s]] * len(runs[s]), [rate([run])[0] for run in runs[s]], "x", color="0.6")
+    axes[1].errorbar([ASPECT[s] for s in shapes], value, error, fmt="o", capsize=5, label="mean and standard error")
+    axes[1].plot([], [], "x", color="0.6", label="one filling")
+    axes[1].axhline(beverloo, color="0.5", ls="--", lw=1, label="Beverloo, spheres")
     axes[1].set_xlabel("aspect ratio a/b")
-    axes[1].set_ylabel("rate / spheres'")
+    axes[1].set_ylabel("grains a second")
+    axes[1].set_ylim(0, 1.15 * beverloo)
     axes[1].set_xscale("log")
     axes[1].set_xticks([ASPECT[s] for s in shapes], [str(ASPECT[s]) for s in shapes])
     axes[1].minorticks_off()
+    axes[1].legend(loc="lower left")
     figure.tight_layout()
     figure.savefig(folder / "discharge.png", dpi=110)
     show = runs["long" if "long" in shapes else shapes[-1]][0]
-    draw(show / "hopper-12000.vtu", folder / "hopper.png", towards=(0.3, -1, 0.25), size=(420, 800), walls=[show / "silo.stl"], zoom=1.5)
+    draw(show / "hopper-10000.vtu", folder / "hopper.png", towards=(0.3, -1, 0.35), size=(420, 640), walls=[show / "silo.stl"],
+         top=0.15, zoom=1.4)
 
 
 if __name__ == "__main__":

@@ -23,7 +23,7 @@ def main(folder):
     figure, axes = plt.subplots(1, 2, figsize=(9, 3.6))
     with open(folder / "press.csv", "w") as f:
         print("seed,touch_mm,most_N,pressure_kPa,work_J,returned,ledger_error", file=f)
-        for file in sorted(folder.glob("*/press.txt")):
+        for number, file in enumerate(sorted(folder.glob("*/press.txt")), 1):
             depth, force, springs, dissipated = press(file)
             touch = depth[np.argmax(force > 0.05 * force.max())]
             power = 0.5 * (force[1:] + force[:-1]) * np.diff(depth)
@@ -36,11 +36,13 @@ def main(folder):
                   f"{returned:.4f},{error:.2g}", file=f)
             print(f"seed {file.parent.name}: at most {force.max():.0f} N ({1e-3 * pressure:.0f} kPa), work {power[power > 0].sum():.3g} J, of which"
                   f" {100 * returned:.0f} % come back; springs and dissipation account for it but for {100 * error:.1f} %")
-            axes[0].plot(1e3 * (depth - touch), force, lw=1)
-            axes[1].plot(1e3 * (depth - touch), work, lw=1, color="tab:blue")
-            axes[1].plot(1e3 * (depth - touch), held, lw=1, ls="--", color="tab:red")
-    for axis, title in zip(axes, ("force on the punch, N", "work; dashed: springs + dissipated, J")):
+            line = axes[0].plot(1e3 * (depth - touch), force, lw=1, label=f"filling {number}")[0]
+            axes[1].plot(1e3 * (depth - touch), work, lw=1, color=line.get_color(), label=f"filling {number}: work of the punch")
+            axes[1].plot(1e3 * (depth - touch), held, lw=1, ls="--", color="black",
+                         label="springs + dissipated" if number == 1 else None)
+    for axis, title in zip(axes, ("force on the punch, N", "energy, J")):
         axis.set(xlabel="displacement from touch, mm", xlim=(-0.5, None), title=title)
+        axis.legend(fontsize=8)
     figure.tight_layout()
     figure.savefig(folder / "force.png", dpi=110)
     draw(min(folder.glob("*/press-15000.vtu")), folder / "press.png", towards=(0.3, -1, 0.45), size=(560, 560), zoom=1.4)

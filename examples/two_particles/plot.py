@@ -71,11 +71,11 @@ def plot(e, times, file):
             axis.plot(e["t"][shown], values[shown], color=color, ls=style, label=label, lw=1.4)
         axis.set_xlabel("time, s")
         axis.set_xlim(0, last)
-    axes[0].set_ylim(0, 1.2 * e["total"][0])
-    for name, time in zip(("A on plane", "B on A", "B on plane"), times):
+    axes[0].set_ylim(0, 1.25 * e["total"][0])
+    for name, time, height in zip(("A on plane", "B on A", "B on plane"), times, (1.19, 1.08, 1.19)):
         if time is not None:
             axes[1].axvline(time, color="0.85", lw=1, zorder=0)
-            axes[1].text(time + 0.003, 1.18 * e["total"][0], name, rotation=90, va="top", fontsize=8, color="0.4")
+            axes[1].text(time + 0.003, height * e["total"][0], name, va="center", fontsize=8, color="0.4")
     axes[0].set_ylabel("energy, J")
     axes[0].legend(frameon=False, fontsize=9, ncol=3, loc="upper right")
     axes[1].set_title("the collisions", fontsize=10)

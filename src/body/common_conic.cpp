@@ -64,11 +64,12 @@ struct Fit {
   bool forward = true;          // without turning back
 };
 
-void see(const Homogeneous& curve, const Conic& q, int depth, Fit* fit) {
+// Derivatives up to `still` are none: what the last digits make of them where the parameter has no speed.
+void see(const Homogeneous& curve, const Conic& q, double still, int depth, Fit* fit) {
   if (depth > 0) {
     const auto [first, second] = halve(curve);
-    see(first, q, depth - 1, fit);
-    see(second, q, depth - 1, fit);
+    see(first, q, still, depth - 1, fit);
+    see(second, q, still, depth - 1, fit);
     return;
   }
   const PlaneCurve p(curve);
@@ -90,7 +91,7 @@ void see(const Homogeneous& curve, const Conic& q, int depth, Fit* fit) {
     fit->gradient = std::min(fit->gradient, g.dot(steepest) / p.w[k]);
     fit->forward &= std::abs(g.dot(way.head<2>())) <= kTilt * g.norm();
   }
-  for (const Vec3& d : hodograph(curve)) fit->forward &= d.dot(way) >= kWay * d.norm();
+  for (const Vec3& d : hodograph(curve)) fit->forward &= d.norm() <= still || d.dot(way) >= kWay * d.norm();
 }
 
 double distance(const Fit& f, const Conic& q) {
@@ -125,7 +126,8 @@ double common_conic_gap(const Homogeneous& one, const Homogeneous& other, bool r
     Homogeneous seen = *curve;
     for (Vec4& p : seen) p.head<3>() = axes * (p.head<3>() - p[3] * centre);
     Fit fit;
-    see(seen, q, kConicHalvings, &fit);
+    const double still = kVanishing * largest(hodograph(seen));
+    see(seen, q, still, kConicHalvings, &fit);
     apart += distance(fit, q);
   }
   const double ends = std::max((place(one.front()) - place(reversed ? other.back() : other.front())).norm(),

@@ -312,15 +312,21 @@ double edge_kink(const std::vector<BezierPatch>& patches, int p, int e, const Ed
 
 double spread_of_normals(const BezierPatch& patch, int edge, double inset) {
   std::array<Vec3, kKinkSamples> normal;
+  double longest = 0, spread = 0;
   for (int k = 0; k < kKinkSamples; ++k) {
     Vec2 at = edge_parameters(edge, k / (kKinkSamples - 1.0));
     at[edge < 2 ? 0 : 1] += edge % 2 ? -inset : inset;
     const Jet1 j = evaluate1(patch, at[0], at[1]);
-    normal[k] = j.su.cross(j.sv).normalized();
+    normal[k] = j.su.cross(j.sv);
+    longest = std::max(longest, normal[k].norm());
   }
-  double spread = 0;
+  const auto is_none = [&](const Vec3& n) {
+    return n.norm() <= kVanishing * longest;
+  };  // no speed along the edge
   for (const Vec3& a : normal) {
-    for (const Vec3& b : normal) spread = std::max(spread, angle_between(a, b));
+    if (is_none(a)) continue;
+    for (const Vec3& b : normal)
+      if (!is_none(b)) spread = std::max(spread, angle_between(a, b));
   }
   return spread;
 }
@@ -330,7 +336,7 @@ double spread_of_normals(const BezierPatch& patch, int edge, double inset) {
 double pole_kink(const BezierPatch& patch, int edge) {
   const double far = spread_of_normals(patch, edge, 2 * kPoleInset),
                near = spread_of_normals(patch, edge, kPoleInset);
-  return std::max(0.0, 2 * near - far);
+  return std::clamp(2 * near - far, 0.0, M_PI);
 }
 
 // Direction, +1 or -1, in which the free parameter of an edge runs round the patch, counter-clockwise being

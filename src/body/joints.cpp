@@ -243,11 +243,19 @@ KinkBounds bound_kink(const BezierPatch& a, int edge, const BezierPatch& b, cons
 }
 
 double bound_pole_spread(const BezierPatch& patch, int edge) {
-  const Homogeneous here = row(patch, edge, 0), next = row(patch, edge, 1);
+  const Homogeneous here = row(patch, edge, 0);
   const Vec3 pole = here.front().head<3>() / here.front()[3];
-  // Near the pole x = pole + u q / w with q the next row seen from the pole; the normal is q cross q'.
-  Vectors q;
-  for (const Vec4& p : next) q.push_back(p.head<3>() - p[3] * pole);
+  const auto seen_from_pole = [&](int k) {
+    Vectors q;
+    for (const Vec4& p : row(patch, edge, k)) q.push_back(p.head<3>() - p[3] * pole);
+    return q;
+  };
+  // Near the pole x = pole + u^k q / w, any factor, with q the first row, the k-th, that is not the pole too;
+  // the normal is q cross q'.
+  const int rows = edge < 2 ? patch.degree_u : patch.degree_v;
+  const double far = largest(seen_from_pole(rows));
+  Vectors q = seen_from_pole(1);
+  for (int k = 2; k <= rows && largest(q) <= kVanishing * far; ++k) q = seen_from_pole(k);
   Vectors normal = multiply(q, derivative(q), kCross);
   const double size = largest(q);
   if (!(largest(normal) > kVanishing * size * size)) return kInfinity;
