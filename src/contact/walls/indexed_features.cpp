@@ -86,7 +86,7 @@ void SurfaceSearch::touch_edge(int number) {
   edges_[number].state = MetEdge::unknown;
   Arc arc;
   if (finds_sharp(deepest) && outer_arc(e, &arc)) return touch_outer_edge(number, arc, active);
-  if (!all_open(e)) return;
+  if (!all_open(e) || is_steep_valley(e)) return;
   int weight = 1;
   for (int i = 0; i < e.sides; ++i)
     if (has_deepest(e, i)) --weight;
@@ -155,7 +155,8 @@ void SurfaceSearch::touch_vertex(int number) {
   if (finds_sharp(deepest) && touch_outer_vertex(number, shallowest->normal)) return;
   if (claimed) return;
   if (edged(*particle_.shape) && lies_under(number)) {
-    add_vertex(at_plane(*shallowest), 1, v, SurfaceContact::under_vertex);
+    if (const ActivePlane* over = plane_over(v))
+      add_vertex(at_plane(*over), 1, v, SurfaceContact::under_vertex);
     return;
   }
   for (int i = 0; i < v.edges; ++i)
@@ -188,6 +189,20 @@ bool SurfaceSearch::lies_under(int number) const {
     }
   }
   return true;
+}
+
+// Of the planes at the vertex of a pit the shallowest that is without a contact, as are those that it bends
+// into; nullptr if there is none.
+const ActivePlane* SurfaceSearch::plane_over(const MeshPatch::Vertex& v) const {
+  const auto at = [&](int i) { return &planes_[patch_.cells()[patch_.cell_at(v.first_cell + i)].plane]; };
+  const ActivePlane* shallowest = nullptr;
+  for (int i = 0; i < v.cells; ++i) {
+    bool met = false;
+    for (int k = 0; k < v.cells; ++k)
+      met = met || (at(k)->contact >= 0 && at(k)->normal.dot(at(i)->normal) > kSteep);
+    if (!met && (!shallowest || at(i)->result.gap > shallowest->result.gap)) shallowest = at(i);
+  }
+  return shallowest;
 }
 
 // Edges within a plane are not met.

@@ -10,8 +10,9 @@
 
 namespace nurbs {
 
-constexpr int kFewCells = 4;             // of a plane, up to which each is looked at on its own
-constexpr double kOneSlope = 0.8;        // cosine
+constexpr int kFewCells = 4;       // of a plane, up to which each is looked at on its own
+constexpr double kOneSlope = 0.8;  // cosine
+constexpr double kSteep = 0.5;     // cosine between the normals of two planes that meet in a steep valley
 constexpr double kSamePlane = 1 - 1e-6;  // cosine: a former contact's polygon stood on this plane
 constexpr double kBluntest = 0.5;        // of the curvature radius: deeper overlaps find the body sharp
 constexpr double kSameNormal = 0.9;      // cosine: a former contact this near has a start for the search
@@ -100,6 +101,7 @@ class SurfaceSearch {
   double clearance(const MeshPatch::Plane& plane) const;
   Vec3 nearest(const MeshPatch::Cell& cell, const MeshPatch::Plane& plane) const;
   bool look_at_plane(int number);
+  bool is_steep_valley(const MeshPatch::Edge& e) const;
   double inside(const ActivePlane& met, const MeshPatch::Plane& plane, const MeshPatch::Edge& e) const;
   bool holds(int number, const ActivePlane& met) const;
   int cell_below(int number);
@@ -127,6 +129,7 @@ class SurfaceSearch {
   bool covered(const FeatureContact& f, const std::vector<Stretch>& line) const;
   void touch_vertex(int number);
   bool lies_under(int number) const;
+  const ActivePlane* plane_over(const MeshPatch::Vertex& v) const;
   MetEdge::State state(int edge) const;
   bool climbs(int edge, int vertex, const Vec3& d) const;
   bool cell_climbs(int number, int vertex, const Vec3& d) const;

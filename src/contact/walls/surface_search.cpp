@@ -292,7 +292,19 @@ double SurfaceSearch::inside(const ActivePlane& met, const MeshPatch::Plane& pla
   return plane.normal.cross(e.direction).dot(x);
 }
 
-// Whether a cell has the deepest point. Borders of the plane are no part of it, cuts within it are.
+// Whether a sharp body overlaps both planes of a steep valley. It has a contact with each, as with two walls:
+// behind the one its deepest point is as far beyond the edge as it overlaps the other.
+bool SurfaceSearch::is_steep_valley(const MeshPatch::Edge& e) const {
+  if (e.inner || e.sides != 2) return false;
+  const ActivePlane &one = planes_[plane_of(e, 0)], &other = planes_[plane_of(e, 1)];
+  if (!one.active || !other.active || !(one.normal.dot(other.normal) <= kSteep)) return false;
+  const double shallower = std::max(one.result.gap, other.result.gap);
+  return shallower >= -kPoked * radius_ && finds_sharp(std::min(one.result.gap, other.result.gap)) &&
+         into(e, 0).dot(other.normal) > 0 && into(e, 1).dot(one.normal) > 0;
+}
+
+// Whether a cell has the deepest point. Borders of the plane are no part of it, cuts within it are, and what
+// is beyond the bottom of a steep valley.
 bool SurfaceSearch::holds(int number, const ActivePlane& met) const {
   const MeshPatch::Cell& cell = patch_.cells()[number];
   const MeshPatch::Plane& plane = patch_.planes()[cell.plane];
@@ -300,7 +312,7 @@ bool SurfaceSearch::holds(int number, const ActivePlane& met) const {
   for (int k = 0; k < cell.corners; ++k) {
     const MeshPatch::Edge& e = patch_.edges()[patch_.edge_of(cell.first + k)];
     const double s = patch_.sign_of(cell.first + k) * inside(met, plane, e);
-    if (!(e.inner ? s >= 0 : s > 0) && patch_.bounds(cell, k, x)) return false;
+    if (!(e.inner ? s >= 0 : s > 0) && patch_.bounds(cell, k, x) && !is_steep_valley(e)) return false;
   }
   return true;
 }
