@@ -10,6 +10,7 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parent))
 import deck  # noqa: E402
+import shapes  # noqa: E402
 
 LAW = "kn 1e5 kt 5e4 cn 20 ct 5 mu 0.3"
 BOX = ((-0.2, 0.2), (-0.2, 0.2), (-0.05, 0.4))
@@ -354,6 +355,27 @@ class BentMeshes(unittest.TestCase):
             energy = out.thermo["ke"] + out.thermo["er"] + out.thermo["led[1]"]
             self.assertGreater(out.thermo["er"][-1], 0.02 * energy[0])  # they were met beside their centres
             np.testing.assert_allclose(energy / energy[0], 1, rtol=0, atol=2e-3)
+
+    def test_sharp_bodies_in_valleys_are_held_by_both_walls(self):
+        """A cone slides down one wall, its base flat on it, onto the other: its rim is as far beyond the other's edge as it overlaps
+        the first. In corners of 90 degrees and less it fell through, and was thrown out with several times its energy."""
+        size = 0.03
+        cone = shapes.revolved([(0, -0.4), (1, -0.4), (0, 1.2)])
+        for degrees in (75, 85, 90, 91, 100, 110, 118, 125, 140):
+            angle = np.radians(degrees)
+            up, out = np.array([np.cos(angle), 0, np.sin(angle)]), np.array([np.sin(angle), 0, -np.cos(angle)])  # the wall
+            tilt = 0.5 * np.arctan2(out[0], out[2])
+            x = size * (1.05 * up + 0.399 * out)
+            far = 0.3 * up
+            mesh = [((0, -0.2, 0), (0.3, -0.2, 0), (0.3, 0.2, 0)), ((0, -0.2, 0), (0.3, 0.2, 0), (0, 0.2, 0)),
+                    ((0, -0.2, 0), (0, 0.2, 0), (far[0], 0.2, far[2])), ((0, -0.2, 0), (far[0], 0.2, far[2]), (far[0], -0.2, far[2]))]
+            pull = -up - 0.3 * out
+            options = {"body": cone, "velocities": [(1, 0, 0, 0, 0, 0, 0)], "gravity": "9.81 vector " + " ".join(map(str, pull)),
+                       "atoms": [(1, 1, 1, size, 2500.0, *x, np.cos(tilt), 0, np.sin(tilt), 0)], "box": ((-0.3, 0.4), (-0.3, 0.3), (-0.1, 0.4))}
+            planes = run("plane 0 0 0 0 0 1", before=f"fix v all wall/nurbs plane 0 0 0 {out[0]} 0 {out[2]} {LAW}", **options)
+            on_mesh = run("mesh m", before=MESH, mesh=mesh, **options)
+            self.assertGreater(planes.thermo["led[1]"].max(), 1e-4)
+            self.assertLess(np.abs(frames(on_mesh)[:, 0, :3] - frames(planes)[:, 0, :3]).max(), 0.02 * size, degrees)
 
     def test_contacts_with_ends_of_a_drum_keep_their_stiffness(self):
         """Tablets at the border between a drum's end and its shell, one mesh: contacts that pass from several points to one and back
