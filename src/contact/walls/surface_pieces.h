@@ -99,12 +99,13 @@ class SurfaceSearch {
   bool stand_on(int number);
   bool stood_on(const Vec3& normal) const;
   double clearance(const MeshPatch::Plane& plane) const;
-  Vec3 nearest(const MeshPatch::Cell& cell, const MeshPatch::Plane& plane) const;
+  Vec3 nearest(const MeshPatch::Cell& cell, const MeshPatch::Plane& plane, const Vec3& c) const;
   bool look_at_plane(int number);
   bool is_steep_valley(const MeshPatch::Edge& e) const;
   double inside(const ActivePlane& met, const MeshPatch::Plane& plane, const MeshPatch::Edge& e) const;
   bool holds(int number, const ActivePlane& met) const;
   int cell_below(int number);
+  int cell_above_valley(int number) const;
   int triangle_under(int number, const Vec3& deepest);
   int cell_with(int number, const Vec3& x) const;
   Vec3 crossing(int number, const Vec3& deepest, double gap) const;

@@ -203,7 +203,8 @@ bool SurfaceSearch::stood_on(const Vec3& normal) const {
 double SurfaceSearch::clearance(const MeshPatch::Plane& plane) const {
   double least = kFarAway;
   for (int i = 0; i < plane.cells && least > 0; ++i) {
-    const Vec3 way = particle_.x - nearest(patch_.cells()[patch_.cell_in(plane.first + i)], plane);
+    const Vec3 way =
+        particle_.x - nearest(patch_.cells()[patch_.cell_in(plane.first + i)], plane, particle_.x);
     const double distance = way.norm();
     if (!(distance > 0)) return 0;
     const double sphere = distance - radius_;
@@ -218,9 +219,8 @@ double SurfaceSearch::clearance(const MeshPatch::Plane& plane) const {
   return least;
 }
 
-// The point of a cell that is nearest to the body's centre.
-Vec3 SurfaceSearch::nearest(const MeshPatch::Cell& cell, const MeshPatch::Plane& plane) const {
-  const Vec3& c = particle_.x;
+// The point of a cell that is nearest to c.
+Vec3 SurfaceSearch::nearest(const MeshPatch::Cell& cell, const MeshPatch::Plane& plane, const Vec3& c) const {
   bool inside = true;
   double least2 = kFarAway;
   Vec3 best = Vec3::Zero();
@@ -303,8 +303,7 @@ bool SurfaceSearch::is_steep_valley(const MeshPatch::Edge& e) const {
          into(e, 0).dot(other.normal) > 0 && into(e, 1).dot(one.normal) > 0;
 }
 
-// Whether a cell has the deepest point. Borders of the plane are no part of it, cuts within it are, and what
-// is beyond the bottom of a steep valley.
+// Whether a cell has the deepest point. Borders of the plane are no part of it, cuts within it are.
 bool SurfaceSearch::holds(int number, const ActivePlane& met) const {
   const MeshPatch::Cell& cell = patch_.cells()[number];
   const MeshPatch::Plane& plane = patch_.planes()[cell.plane];
@@ -312,7 +311,7 @@ bool SurfaceSearch::holds(int number, const ActivePlane& met) const {
   for (int k = 0; k < cell.corners; ++k) {
     const MeshPatch::Edge& e = patch_.edges()[patch_.edge_of(cell.first + k)];
     const double s = patch_.sign_of(cell.first + k) * inside(met, plane, e);
-    if (!(e.inner ? s >= 0 : s > 0) && patch_.bounds(cell, k, x) && !is_steep_valley(e)) return false;
+    if (!(e.inner ? s >= 0 : s > 0) && patch_.bounds(cell, k, x)) return false;
   }
   return true;
 }
@@ -327,7 +326,33 @@ int SurfaceSearch::cell_below(int number) {
     plane.hint = cell;
     return cell;
   }
-  return -1;
+  return cell_above_valley(number);
+}
+
+// The cell of a plane whose deepest point is beyond the bottom of a steep valley, or of several at a vertex:
+// of the plane, the point that is nearest is on no other border. -1 if it is none.
+int SurfaceSearch::cell_above_valley(int number) const {
+  const ActivePlane& met = planes_[number];
+  const MeshPatch::Plane& plane = patch_.planes()[number];
+  const auto steep = [&](int i) {
+    return is_steep_valley(patch_.edges()[patch_.edge_in(plane.first_edge + i)]);
+  };
+  bool any = false;
+  for (int i = 0; i < plane.edges && !any; ++i) any = steep(i);
+  if (!any) return -1;
+  const Vec3 x = particle_.x + met.deepest;
+  int cell = -1;
+  Vec3 best = x;
+  for (int i = 0; i < plane.cells; ++i) {
+    const int here = patch_.cell_in(plane.first + i);
+    const Vec3 y = nearest(patch_.cells()[here], plane, x);
+    if (cell < 0 || (y - x).squaredNorm() < (best - x).squaredNorm()) cell = here, best = y;
+  }
+  for (int i = 0; i < plane.edges; ++i) {
+    const MeshPatch::Edge& e = patch_.edges()[patch_.edge_in(plane.first_edge + i)];
+    if (from_edge(patch_, e, best).norm() < kWithin * radius_ && !steep(i)) return -1;
+  }
+  return cell;
 }
 
 // The cell of a plane that a point is above, or below; -1: none.
@@ -375,7 +400,7 @@ bool SurfaceSearch::passes_by(int number, const Vec3& deepest, double gap) const
   if (cell_with(number, x) < 0) return false;
   for (int i = 0; i < plane.cells; ++i) {
     const int here = patch_.cell_in(plane.first + i);
-    if (!((particle_.x - nearest(patch_.cells()[here], plane)).norm() < radius_)) continue;
+    if (!((particle_.x - nearest(patch_.cells()[here], plane, particle_.x)).norm() < radius_)) continue;
     corners.clear();
     add_corners(here, &corners);
     if (!misses(corners)) return false;
