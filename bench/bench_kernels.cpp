@@ -302,8 +302,7 @@ void tube(benchmark::State& state, int which, double turn) {
     for (int i = 0; i < kSteps; ++i) {
       const SurfaceContacts last = found;
       FormerContact former[kSurfaceContacts];
-      for (int j = 0; j < last.count; ++j)
-        former[j] = {last.contact[j].normal, &last.contact[j].memory, false};
+      for (int j = 0; j < last.count; ++j) former[j] = former_contact(last.contact[j]);
       const double step_time = timed([&] {
         find_cylinder_contacts(path[i], Vec3::Zero(), axis, radius, settings, 0, former, last.count, &survey,
                                &found);

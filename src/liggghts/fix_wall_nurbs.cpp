@@ -327,8 +327,22 @@ void FixWallNurbs::warn_deep(const nurbs::DeepContacts& contacts, const char* wh
                         last_deep_warning_);
 }
 
+// The most in one step of the run.
+void FixWallNurbs::warn_left_out() {
+  int most = 0;
+  MPI_Allreduce(&most_overflows_, &most, 1, MPI_INT, MPI_MAX, world);
+  most_overflows_ = 0;
+  if (most == 0) return;
+  nurbs_host::warn(FLERR, lmp,
+                   name_of(*this) + ": " + std::to_string(most) + " particle(s) touched more than " +
+                       std::to_string(nurbs::kSurfaceContacts) +
+                       " pieces of the mesh at once; the others were left out, so that forces are too small. "
+                       "Use a coarser mesh");
+}
+
 void FixWallNurbs::post_run() {
   nurbs_host::warn_deep_run(lmp, stages_.deep_in_run(), name_of(*this));
+  warn_left_out();
 }
 
 void FixWallNurbs::hand_in_neighbours() {
@@ -488,6 +502,7 @@ void FixWallNurbs::compute_surface(nurbs::ContactStages::Step& step) {
   stages_.begin_step(step);
   surface_.find(step, triangles_, moved, reinterpret_cast<nurbs::PairProof*>(proofs_[0]), &stages_);
   stages_.end_step(surface_.neighbours());
+  most_overflows_ = std::max(most_overflows_, surface_.overflows());
   if (kind_ == Kind::mesh) tell_meshes();
 }
 

@@ -114,6 +114,7 @@ class FixWallNurbs : public Fix {
   void warn_mesh_types();
   void warn_time_step();
   void warn_deep(const nurbs::DeepContacts& contacts, const char* when);
+  void warn_left_out();
 
   using Kind = nurbs::SurfaceWall::Kind;
   Kind kind_ = Kind::plane;
@@ -139,6 +140,7 @@ class FixWallNurbs : public Fix {
   bool periodic_warned_ = false, types_warned_ = false;
   bigint checked_particles_ = 0;  // when deep contacts were last looked for
   int last_tag_ = 0;              // the largest one then
+  int most_overflows_ = 0;        // in a step of the run
   std::string last_warning_, last_deep_warning_, last_model_warning_;
 };
 

@@ -145,7 +145,7 @@ class ContactStages {
   // Contacts that the caller finds itself every step, instead of neighbours. They are listed by body: a head,
   // the number of its first contact (0: none), travels with the body. A step is begin_step, give for every
   // body that touches or has a list, end_step. At most kMostListed a body.
-  static constexpr int kMostListed = 32;
+  static constexpr int kMostListed = 64;
   void begin_step(const Step& step);
   // What came of the last step's contacts is carried over to those of this one by place and normal, whatever
   // part of the wall they were on; those without a successor are closed. `balanced`: contacts that come or go

@@ -48,7 +48,7 @@ class SurfaceWall {
             PairProof* heads, ContactStages* stages);
 
   double neighbours() const { return static_cast<double>(bodies_near_); }
-  // Bodies with more contacts than fit, in the last step.
+  // Bodies with more contacts than kSurfaceContacts, in the last step: the others are left out.
   int overflows() const { return overflows_; }
   // Mesh and triangle of a contact, by its mark.
   int mesh_of(int mark) const { return mark % kMostMeshes; }

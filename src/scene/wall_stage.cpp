@@ -4,9 +4,12 @@
 #include <cmath>
 #include <cstring>
 
+#include "contact/walls/surface_search.h"
 #include "scene/contact_results.h"
 
 namespace nurbs {
+
+static_assert(kSurfaceContacts <= ContactStages::kMostListed);
 namespace {
 
 constexpr double kSameSide = 0.7;             // cosine between normals: 45 degrees
@@ -72,6 +75,7 @@ int ContactStages::former(std::int32_t head, FormerContact* contacts, PairMemory
     PairMemory& m = memories[count];
     FormerContact& c = contacts[count++];
     c = {listed_normal(head), &m, false};
+    c.subtracts = sign(block, lane) < 0;
     if (const FlatContact* flat = pool_.flat_of(block, lane)) {
       c.flat = true;
       c.polygon = &flat->polygon;

@@ -242,8 +242,7 @@ TEST(Fuzz, meshes) {
       double path = 0;
       for (int step = 0; step < 6; ++step) {
         std::vector<FormerContact> former;
-        for (int i = 0; i < before.count; ++i)
-          former.push_back({before.contact[i].normal, &before.contact[i].memory, before.contact[i].flat});
+        for (int i = 0; i < before.count; ++i) former.push_back(former_contact(before.contact[i]));
         now = SurfaceContacts();
         find_surface_contacts(p, patch, settings, path, former.data(), static_cast<int>(former.size()), &now);
         expect_sane(now, size, shape->name);

@@ -106,6 +106,7 @@ class SurfaceSearch {
   bool holds(int number, const ActivePlane& met) const;
   int cell_below(int number);
   int cell_above_valley(int number) const;
+  bool meets_cells(int number) const;
   int triangle_under(int number, const Vec3& deepest);
   int cell_with(int number, const Vec3& x) const;
   Vec3 crossing(int number, const Vec3& deepest, double gap) const;

@@ -348,11 +348,30 @@ int SurfaceSearch::cell_above_valley(int number) const {
     const Vec3 y = nearest(patch_.cells()[here], plane, x);
     if (cell < 0 || (y - x).squaredNorm() < (best - x).squaredNorm()) cell = here, best = y;
   }
+  bool meets = meets_cells(number);
   for (int i = 0; i < plane.edges; ++i) {
     const MeshPatch::Edge& e = patch_.edges()[patch_.edge_in(plane.first_edge + i)];
-    if (from_edge(patch_, e, best).norm() < kWithin * radius_ && !steep(i)) return -1;
+    if (!(from_edge(patch_, e, best).norm() < kWithin * radius_)) continue;
+    if (!steep(i)) return -1;
+    const int first = plane_of(e, 0);
+    meets = meets || meets_cells(first == number ? plane_of(e, 1) : first);
   }
-  return cell;
+  return meets ? cell : -1;
+}
+
+// Whether the body meets a cell of the plane.
+bool SurfaceSearch::meets_cells(int number) const {
+  const MeshPatch::Plane& plane = patch_.planes()[number];
+  std::vector<Vec3>& corners = workspace().corners;
+  for (int i = 0; i < plane.cells; ++i) {
+    const int here = patch_.cell_in(plane.first + i);
+    const Vec3 y = nearest(patch_.cells()[here], plane, particle_.x);
+    if (!((particle_.x - y).norm() < radius_)) continue;
+    corners.clear();
+    add_corners(here, &corners);
+    if (!misses(corners)) return true;
+  }
+  return false;
 }
 
 // The cell of a plane that a point is above, or below; -1: none.
@@ -398,13 +417,7 @@ bool SurfaceSearch::passes_by(int number, const Vec3& deepest, double gap) const
   std::vector<Vec3>& corners = workspace().corners;
   const Vec3 x = particle_.x + deepest;
   if (cell_with(number, x) < 0) return false;
-  for (int i = 0; i < plane.cells; ++i) {
-    const int here = patch_.cell_in(plane.first + i);
-    if (!((particle_.x - nearest(patch_.cells()[here], plane, particle_.x)).norm() < radius_)) continue;
-    corners.clear();
-    add_corners(here, &corners);
-    if (!misses(corners)) return false;
-  }
+  if (meets_cells(number)) return false;
   // A sharp body may be in the wall by a neighbour of the cell that it is over, and meet the face nowhere.
   for (int i = 0; i < plane.cells; ++i) {
     const int here = patch_.cell_in(plane.first + i);

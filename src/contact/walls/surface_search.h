@@ -60,9 +60,16 @@ struct FormerContact {
   const ContactPolygon* polygon = nullptr;  // ... this one, if it is known, ...
   Vec3 frame = Vec3::Zero();                // ... with arms from this fixed point of the wall, ...
   double until = -kFarAway;                 // ... beside which the body touches nowhere before this path
+  bool subtracts = false;                   // its weight is negative
 };
 
-constexpr int kSurfaceContacts = 32;
+inline FormerContact former_contact(const SurfaceContact& c) {
+  FormerContact f{c.normal, &c.memory, c.flat};
+  f.subtracts = c.weight < 0;
+  return f;
+}
+
+constexpr int kSurfaceContacts = 64;
 
 struct SurfaceContacts {
   int count = 0;

@@ -10,6 +10,8 @@
 namespace nurbs {
 namespace {
 
+constexpr double kWidestGap = 2;  // rad, between contacts that a minimum above the radius may part
+
 static_assert(0.5 * kRingNormals + kSurveyRoom < kNormalMargin);
 
 // F and its slope along the circle, from one support search.
@@ -84,6 +86,35 @@ class Tube {
     return best;
   }
 
+  // The minimum between two maxima, where it is above `level`. Supports of the points found so far are F's
+  // lower bounds: where those of a fall and a rise cross, it is the minimum if F is no more there.
+  bool bottom(Reach low, Reach high, double level, Reach* found) const {
+    const double noise = kRingSupport * particle_.scale * particle_.shape->bounding_radius;
+    for (int k = 0; k < 60; ++k) {
+      const Vec3 way = high.on_body - low.on_body;
+      const double width = high.angle - low.angle, cross = std::atan2(-way.dot(u_), way.dot(v_));
+      const double turn = std::remainder(cross - low.angle, M_PI),
+                   secant = low.slope / (low.slope - high.slope);
+      double t = k % 2 == 0 ? (turn < 0 ? turn + M_PI : turn) / width : secant;
+      if (!(t > 1e-7 && t < 1 - 1e-7)) t = 0.5;
+      const double angle = low.angle + t * width;
+      const Reach next = look(angle, t < 0.5 ? &low : &high);
+      if (!(next.value > level)) return false;
+      const Vec3 d = direction(angle);
+      const double least = d.dot(apart_) + std::max(d.dot(low.on_body), d.dot(high.on_body));
+      *found = next;
+      if (next.value - least <= noise || width < 1e-12) {
+        // Of the points that are as far out, that where F does not turn.
+        const Vec3 e = std::cos(angle) * v_ - std::sin(angle) * u_;
+        const double l = e.dot(apart_ + low.on_body), h = e.dot(apart_ + high.on_body);
+        if (h > l) found->on_body = low.on_body + std::clamp(-l / (h - l), 0.0, 1.0) * way;
+        return true;
+      }
+      (next.slope < 0 ? low : high) = next;
+    }
+    return true;
+  }
+
   // Whether maxima between two directions are nearer than nearest(): where F' = 0 twice, rho - F sums to
   // 0 in between, so that they are as far apart on the wall as the outline is long.
   bool is_short(const Reach& low, const Reach& high) const {
@@ -142,6 +173,7 @@ struct Workspace {
   Reach at[kMost];
   Kind kind[kMost];
   Known known[kSurfaceContacts], last;
+  FormerContact maxima[kSurfaceContacts];
 };
 Workspace& workspace() {
   static thread_local Workspace w;
@@ -165,6 +197,32 @@ class TubeSearch {
                                                  : pose.apart.norm()),  // its direction would be round-off's
         tube_(particle, pose, distance_ > 0 ? pose.apart : Vec3::Zero()),
         out_(*out) {}
+
+  // F - radius is a function on the circle, and the potentials of its maxima less those of its minima are as
+  // smooth as that is: where a maximum and a minimum meet and are gone, nothing is lost. So minima between
+  // contacts count against them.
+  void take_off_minima() {
+    int order[kSurfaceContacts];
+    double angle[kSurfaceContacts];
+    const int count = out_.count;
+    if (count < 2) return;
+    for (int k = 0; k < count; ++k) {
+      order[k] = k;
+      angle[k] = tube_.angle(-out_.contact[k].normal);
+    }
+    std::sort(order, order + count, [&](int a, int b) { return angle[a] < angle[b]; });
+    for (int k = 0; k < count; ++k) {
+      const int from = order[k], to = order[(k + 1) % count];
+      const double width = angle[to] - angle[from] + (k + 1 == count ? 2 * M_PI : 0);
+      Reach low = reach_at_contact(from, angle[from]), high = reach_at_contact(to, angle[from] + width),
+            least;
+      if (width > kWidestGap || !tube_.bottom(low, high, pose_.radius, &least)) continue;
+      const Known k_least = known(least);
+      SurfaceContact c = surface_contact(k_least.contact, k_least.memory);
+      c.weight = -1;
+      out_.add(c);
+    }
+  }
 
   bool is_single() const { return distance_ > 0 && !wants_survey(particle_, pose_.radius); }
   // The one maximum of a body that is more curved than the tube everywhere: a former contact's, or looked
@@ -286,6 +344,16 @@ class TubeSearch {
     if (!follow_on_cylinder(particle_, pose_, settings_, &to->memory, &to->contact)) return false;
     to->angle = tube_.angle(-to->contact.normal);
     return true;
+  }
+
+  Reach reach_at_contact(int number, double angle) const {
+    const SurfaceContact& c = out_.contact[number];
+    Reach r;
+    r.angle = angle;
+    r.value = pose_.radius - c.gap;
+    r.on_body = c.on_body;
+    r.where = warm_point(c.memory.on_b, *particle_.shape);
+    return r;
   }
 
   void add(const Known& k) {
@@ -584,13 +652,18 @@ SurfaceContact surface_contact(const CylinderContact& contact, const PairMemory&
 double find_in_tube(const Particle& particle, const CylinderPose& pose, const ContactSettings& settings,
                     const FormerContact* former, int former_count, TubeSurvey* survey, SurfaceContacts* out) {
   TubeSearch search(particle, pose, settings, out);
-  if (search.is_single()) return search.find_one(former, former_count);
+  FormerContact* maxima = workspace().maxima;
+  int count = 0;
+  for (int k = 0; k < std::min(former_count, kSurfaceContacts); ++k)
+    if (!former[k].subtracts) maxima[count++] = former[k];
+  if (search.is_single()) return search.find_one(maxima, count);
   double clear = 0;
-  if (survey != nullptr && survey->room > 0) {
-    if (search.find_in(*survey, former, former_count, &clear)) return clear;
+  if (!(survey != nullptr && survey->room > 0 && search.find_in(*survey, maxima, count, &clear))) {
     out->count = 0;
+    clear = search.find_all(maxima, count, survey);
   }
-  return search.find_all(former, former_count, survey);
+  search.take_off_minima();
+  return clear;
 }
 
 }  // namespace nurbs

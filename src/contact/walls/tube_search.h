@@ -7,7 +7,8 @@
 // would, between two of them, stay negative for half a turn (Sturm). So a body that is everywhere more curved
 // than the tube has one contact. On others (flats, ruled lines) the circle is sampled once, and split into
 // what F is proven to stay `room` below the radius in, and arcs whose maxima are followed
-// (cylinder_follow.h) until the body has moved by `room`.
+// (cylinder_follow.h) until the body has moved by `room`. Between two contacts F may have a minimum above the
+// radius: that is one of weight -1, as in the valleys of meshes (surface_search.h).
 #pragma once
 
 #include "contact/walls/cylinder_follow.h"
