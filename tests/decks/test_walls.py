@@ -356,6 +356,29 @@ class BentMeshes(unittest.TestCase):
             self.assertGreater(out.thermo["er"][-1], 0.02 * energy[0])  # they were met beside their centres
             np.testing.assert_allclose(energy / energy[0], 1, rtol=0, atol=2e-3)
 
+    def test_a_ball_on_many_nails(self):
+        """A contact with each, and a warning where there are more than there is room for."""
+        radius, depth = 0.1, 1e-4
+        for n, bears in ((7, True), (9, False)):
+            places = [0.01 * (np.array((i, j)) - 0.5 * (n - 1)) for i in range(n) for j in range(n)]
+            tips = [np.array((*xy, radius - depth + depth / (1 + k % 3) - np.sqrt(radius**2 - xy @ xy))) for k, xy in enumerate(places)]
+            nails = []
+            for tip in tips:
+                foot = [tip + (0.002 * a, 0.002 * b, -0.03) for a, b in ((-1, -1), (1, -1), (1, 1), (-1, 1))]
+                nails += [(foot[i], foot[(i + 1) % 4], tip) for i in range(4)]
+            ball = np.array((0, 0, radius - depth))
+            out = run("mesh m", [(1, 1, 1, radius, 2500.0, *ball, 1, 0, 0, 0)], (), mesh=nails, body=shape("sphere", 1), before=MESH,
+                      law="kn 1e5 kt 0 mu 0", gravity=None, steps="run 0")
+            warning = "1 particle(s) touched more than 64 pieces of the mesh at once"
+            self.assertEqual(warning in out.screen, not bears)
+            if not bears:
+                continue
+            ways = ball - tips
+            overlaps = radius - np.linalg.norm(ways, axis=1)
+            self.assertGreater(overlaps.min(), 0)
+            self.assertEqual(out.thermo["st[8]"][0], n * n)
+            np.testing.assert_allclose(out.thermo["w"][0], 0.5e5 * overlaps @ overlaps, rtol=1e-5)
+
     def test_sharp_bodies_in_valleys_are_held_by_both_walls(self):
         """A cone slides down one wall, its base flat on it, onto the other: its rim is as far beyond the other's edge as it overlaps
         the first. In corners of 90 degrees and less it fell through, and was thrown out with several times its energy."""
@@ -715,6 +738,24 @@ class Cylinders(unittest.TestCase):
         out = run("cylinder y 0.1 0 0.12", ball, [(1, 0, 0.3, 0, 5, 0, 3)], law="kn 1e5 kt 5e4 mu 0.3", steps="run 15000")
         self.assertLess(np.ptp(out.thermo["ledger"]), 1e-4 * out.thermo["ledger"][0])
 
+
+    def test_pebbles_as_large_as_the_tube_keep_their_energy(self):
+        """Broader than the tube they lean on both ends of a side: where the two become one, the reach between them is as far out as
+        they are, and is taken off. Without that a contact came or went at full depth."""
+        size = 0.03
+        for pebble, bounding_radius in ((3, 1.02889645), (5, 1.03927725)):
+            body = deck.shape_file("pebble", seed=str(pebble), roundness="0.5", elongation="1", flatness="1")
+            random = np.random.default_rng(2)
+            turn = random.normal(size=4)
+            atoms = [(1, 1, 1, size, 2500.0, 0, 0, 0.1, *(turn / np.linalg.norm(turn)))]
+            velocity, spin = random.normal(size=3) * (1, 0.02, 1), random.normal(size=3) / size
+            out = run(f"cylinder y {1.01 * size * bounding_radius} 0 0.1", atoms, [(1, *velocity, *spin)], body=body,
+                      gravity=None, law="kn 1e6 kt 0 mu 0", dt=2e-6, after="thermo 20", thermo="c_ke c_er")
+            t = out.thermo
+            energy = t["ke"] + t["er"] + t["led[1]"] + t["led[2]"]
+            self.assertGreater(t["st[8]"].max(), 1)
+            self.assertLess(t["led[1]"].min(), 0.01 * energy[0])
+            np.testing.assert_allclose(energy / energy[0], 1, rtol=0, atol=4e-4)  # 1.3e-3 once
 
     def test_capsules_on_both_ends_stay_in_the_tube(self):
         """A capsule that lands on one end and rocks to the other: where the reach along the axis gets its second maximum, the
