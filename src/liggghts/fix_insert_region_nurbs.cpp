@@ -3,12 +3,14 @@
 
 #include <mpi.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstring>
 #include <string>
 #include <vector>
 
 #include "atom.h"
+#include "domain.h"
 #include "fix_property_atom.h"
 #include "liggghts/atom_vec_nurbs.h"
 #include "liggghts/host_error.h"
@@ -36,6 +38,35 @@ void require_room(LAMMPS* lmp, const Fix& fix, const Region& region, double radi
                                nurbs_host::show(extent[k]) + " long in " + "xyz"[k] +
                                ", too short for all_in yes and particles of bounding diameter " +
                                nurbs_host::show(2 * radius));
+}
+
+// Processors insert each in their own part of the region: warns where a part has no room for a particle of
+// this bounding radius.
+void warn_of_narrow_parts(LAMMPS* lmp, const Fix& fix, const Region& region, double radius) {
+  const double low[3] = {region.extent_xlo, region.extent_ylo, region.extent_zlo};
+  const double high[3] = {region.extent_xhi, region.extent_yhi, region.extent_zhi};
+  double mine[3], shortest[3];
+  bool empty = !region.bboxflag;
+  for (int k = 0; k < 3; ++k) {
+    mine[k] = std::min(high[k], lmp->domain->subhi[k]) - std::max(low[k], lmp->domain->sublo[k]);
+    empty = empty || !(mine[k] > 0);
+  }
+  if (empty) std::fill(mine, mine + 3, 1e300);
+  MPI_Allreduce(mine, shortest, 3, MPI_DOUBLE, MPI_MIN, lmp->world);
+  for (int k = 0; k < 3; ++k)
+    if (shortest[k] < 2 * radius)
+      nurbs_host::warn(FLERR, lmp,
+                       nurbs_host::name_of(fix) + ": a processor's part of region " + region.id + " is " +
+                           nurbs_host::show(shortest[k]) + " long in " + "xyz"[k] +
+                           ", too short for all_in yes and particles of bounding diameter " +
+                           nurbs_host::show(2 * radius) +
+                           "; it inserts none there. Use fewer processors along " + "xyz"[k] +
+                           " (command 'processors')");
+}
+
+void check_room(LAMMPS* lmp, const Fix& fix, const Region& region, double radius) {
+  require_room(lmp, fix, region, radius);
+  warn_of_narrow_parts(lmp, fix, region, radius);
 }
 
 // Whether `orientation constant QW QX QY QZ` is among the words; the four are checked.
@@ -70,13 +101,13 @@ template class OrientedInsert<FixInsertStream>;
 
 void FixInsertPackNurbs::calc_insertion_properties() {
   if (ins_region != nullptr && all_in_flag && holds_nurbs(*atom))
-    require_room(lmp, *this, *ins_region, max_r_bound());
+    check_room(lmp, *this, *ins_region, max_r_bound());
   FixInsertPack::calc_insertion_properties();
 }
 
 void FixInsertRateRegionNurbs::calc_insertion_properties() {
   if (ins_region != nullptr && all_in_flag && holds_nurbs(*atom))
-    require_room(lmp, *this, *ins_region, max_r_bound());
+    check_room(lmp, *this, *ins_region, max_r_bound());
   FixInsertRateRegion::calc_insertion_properties();
 }
 

@@ -377,6 +377,16 @@ class Refused(Decks):
         text = header() + PLAIN + "region ins block 0 0.1 0 0.1 5 5.1 units box\n"
         self.refuse(text + insert_pack("particles_in_region 5", "one") + "run 1\n", "Fix insert/pack i: region ins is 0.1 long in x", "bounding diameter 1")
 
+    def test_parts_of_a_region_too_small(self):
+        """Processors insert each in its own part: told of where that has no room for a particle."""
+        text = header() + PLAIN + "region ins block -0.6 0.6 -4.9 4.9 0.1 9.9 units box\n"
+        text += insert_pack("particles_in_region 5", "one") + "run 1\n"
+        for x, y in ((2, 1), (1, 2)):
+            screen = self.run_deck(text.replace("boundary", f"processors {x} {y} 1\nboundary", 1), ranks=2).screen
+            told = "WARNING: Fix insert/pack i: a processor's part of region ins is 0.6 long in x, too short" in screen
+            self.assertEqual(told, x == 2)
+            self.assertEqual("Less insertions than requested" in screen, x == 2)
+
 
 if __name__ == "__main__":
     unittest.main()

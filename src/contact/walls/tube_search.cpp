@@ -166,7 +166,7 @@ enum Kind : unsigned char {
 };
 
 // Room that is used again by every search of a thread.
-struct Workspace {
+struct TubeWorkspace {
   static constexpr int kMost = 512;
   // Directions in the order of their angles, closer together where F may exceed the radius, and what is
   // between each and the one before.
@@ -175,8 +175,8 @@ struct Workspace {
   Known known[kSurfaceContacts], last;
   FormerContact maxima[kSurfaceContacts];
 };
-Workspace& workspace() {
-  static thread_local Workspace w;
+TubeWorkspace& tube_workspace() {
+  static thread_local TubeWorkspace w;
   return w;
 }
 
@@ -614,7 +614,7 @@ class TubeSearch {
     return count;
   }
 
-  static constexpr int kMost = Workspace::kMost, kMostAngles = 64;
+  static constexpr int kMost = TubeWorkspace::kMost, kMostAngles = 64;
   const Particle& particle_;
   const CylinderPose& pose_;
   const ContactSettings& settings_;
@@ -622,13 +622,13 @@ class TubeSearch {
   const Tube tube_;
   SurfaceContacts& out_;
   double room_ = 0, still_ = 0, bound_ = 0;         // F is nowhere larger than the bound
-  Known& last_ = workspace().last;                  // maximum met, which is a contact ...
+  Known& last_ = tube_workspace().last;             // maximum met, which is a contact ...
   double last_top_ = -HUGE_VAL, least_ = HUGE_VAL;  // ... with this F, and the least F since then
   int count_ = 0, known_count_ = 0;
   Reach start_;
-  Reach* const at_ = workspace().at;
-  Kind* const kind_ = workspace().kind;
-  Known* const known_ = workspace().known;
+  Reach* const at_ = tube_workspace().at;
+  Kind* const kind_ = tube_workspace().kind;
+  Known* const known_ = tube_workspace().known;
 };
 
 }  // namespace
@@ -652,7 +652,7 @@ SurfaceContact surface_contact(const CylinderContact& contact, const PairMemory&
 double find_in_tube(const Particle& particle, const CylinderPose& pose, const ContactSettings& settings,
                     const FormerContact* former, int former_count, TubeSurvey* survey, SurfaceContacts* out) {
   TubeSearch search(particle, pose, settings, out);
-  FormerContact* maxima = workspace().maxima;
+  FormerContact* maxima = tube_workspace().maxima;
   int count = 0;
   for (int k = 0; k < std::min(former_count, kSurfaceContacts); ++k)
     if (!former[k].subtracts) maxima[count++] = former[k];
