@@ -330,7 +330,8 @@ int SurfaceSearch::cell_below(int number) {
 }
 
 // The cell of a plane whose deepest point is beyond the bottom of a steep valley, or of several at a vertex:
-// of the plane, the point that is nearest is on no other border. -1 if it is none.
+// of the plane, the point that is nearest is on no other border. -1 if there is none, or the body meets
+// neither the plane's cells nor those across.
 int SurfaceSearch::cell_above_valley(int number) const {
   const ActivePlane& met = planes_[number];
   const MeshPatch::Plane& plane = patch_.planes()[number];
@@ -348,7 +349,7 @@ int SurfaceSearch::cell_above_valley(int number) const {
     const Vec3 y = nearest(patch_.cells()[here], plane, x);
     if (cell < 0 || (y - x).squaredNorm() < (best - x).squaredNorm()) cell = here, best = y;
   }
-  bool meets = meets_cells(number);
+  bool meets = false;
   for (int i = 0; i < plane.edges; ++i) {
     const MeshPatch::Edge& e = patch_.edges()[patch_.edge_in(plane.first_edge + i)];
     if (!(from_edge(patch_, e, best).norm() < kWithin * radius_)) continue;
@@ -356,7 +357,7 @@ int SurfaceSearch::cell_above_valley(int number) const {
     const int first = plane_of(e, 0);
     meets = meets || meets_cells(first == number ? plane_of(e, 1) : first);
   }
-  return meets ? cell : -1;
+  return meets || meets_cells(number) ? cell : -1;
 }
 
 // Whether the body meets a cell of the plane.

@@ -214,9 +214,10 @@ class TubeSearch {
     for (int k = 0; k < count; ++k) {
       const int from = order[k], to = order[(k + 1) % count];
       const double width = angle[to] - angle[from] + (k + 1 == count ? 2 * M_PI : 0);
-      Reach low = reach_at_contact(from, angle[from]), high = reach_at_contact(to, angle[from] + width),
-            least;
-      if (width > kWidestGap || !tube_.bottom(low, high, pose_.radius, &least)) continue;
+      if (width > kWidestGap) continue;
+      const Reach low = reach_at_contact(from, angle[from]), high = reach_at_contact(to, angle[from] + width);
+      Reach least;
+      if (!tube_.bottom(low, high, pose_.radius, &least)) continue;
       const Known k_least = known(least);
       SurfaceContact c = surface_contact(k_least.contact, k_least.memory);
       c.weight = -1;
