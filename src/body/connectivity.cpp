@@ -63,25 +63,22 @@ constexpr double kNoGap = 1e-6;        // of the tolerance: sides so near have t
 constexpr double kNotByChance = 1e-2;  // share of a gap that better parameters leave
 constexpr double kShortGap = 1e-3;     // of a short edge: what its partner may be off
 
-double same_parameter_gap(const Edge& a, const Edge& b, bool reversed) {
-  double gap = 0;
-  for (int k = 0; k < kEdgeSamples; ++k) {
-    gap = std::max(gap, (a.at[k] - b.at[reversed ? kEdgeSamples - 1 - k : k]).norm());
-  }
-  return gap;
-}
-
-// Largest distance of the samples of `a` from the curve `b`, whatever the parametrisation. Their ends must
-// agree, and the middle of b must lie on a too: otherwise b could be a longer curve between the same ends.
-double curve_gap(const std::vector<BezierPatch>& patches, const Edge& a, const Edge& b) {
-  double gap = 0;
+// Largest distance of the samples of `a` from the curve `b`, whatever the parametrisation.
+double reach_from(const std::vector<BezierPatch>& patches, const Edge& a, const Edge& b) {
+  double reach = 0;
   for (const Vec3& x : a.at) {
     const double t = closest_parameter(patches[b.patch], b.edge, x);
-    gap = std::max(gap, (edge_point(patches[b.patch], b.edge, t) - x).norm());
+    reach = std::max(reach, (edge_point(patches[b.patch], b.edge, t) - x).norm());
   }
+  return reach;
+}
+
+// The same where their ends agree. The middle of b must lie on a too: otherwise b could be a longer curve
+// between the same ends.
+double curve_gap(const std::vector<BezierPatch>& patches, const Edge& a, const Edge& b) {
   const Vec3& middle = b.at[kEdgeSamples / 2];
   const double t = closest_parameter(patches[a.patch], a.edge, middle);
-  return std::max(gap, (edge_point(patches[a.patch], a.edge, t) - middle).norm());
+  return std::max(reach_from(patches, a, b), (edge_point(patches[a.patch], a.edge, t) - middle).norm());
 }
 
 // Two edges that agree. `a` < `b` are indices; the rest is a's link to b, see EdgeLink.
@@ -209,7 +206,8 @@ void join(const Edge& a, const Edge& b, const Candidate& c, PatchLinks& links) {
   links[b.patch][b.edge] = link_of(turned(c), a);
 }
 
-UnmatchedEdge describe_unmatched(const std::vector<Edge>& edges, const PatchLinks& links, int left) {
+UnmatchedEdge describe_unmatched(const std::vector<BezierPatch>& patches, const std::vector<Edge>& edges,
+                                 const PatchLinks& links, int left) {
   UnmatchedEdge out;
   out.patch = edges[left].patch;
   out.edge = edges[left].edge;
@@ -217,13 +215,11 @@ UnmatchedEdge describe_unmatched(const std::vector<Edge>& edges, const PatchLink
   for (int e = 0; e < static_cast<int>(edges.size()); ++e) {
     const bool free = links[edges[e].patch][edges[e].edge].patch < 0 && !edges[e].collapsed;
     if (e == left || !free) continue;
-    for (bool reversed : {false, true}) {
-      const double gap = same_parameter_gap(edges[left], edges[e], reversed);
-      if (gap >= out.gap) continue;
-      out.gap = gap;
-      out.nearest_patch = edges[e].patch;
-      out.nearest_edge = edges[e].edge;
-    }
+    const double gap = reach_from(patches, edges[left], edges[e]);
+    if (gap >= out.gap) continue;
+    out.gap = gap;
+    out.nearest_patch = edges[e].patch;
+    out.nearest_edge = edges[e].edge;
   }
   return out;
 }
@@ -394,7 +390,8 @@ UnmatchedEdge connect_patches(const std::vector<BezierPatch>& patches, double to
   }
   for (size_t i = 0; i < edges.size(); ++i) {
     const EdgeLink& link = links[edges[i].patch][edges[i].edge];
-    if (link.patch < 0 && !link.collapsed) return describe_unmatched(edges, links, static_cast<int>(i));
+    if (link.patch < 0 && !link.collapsed)
+      return describe_unmatched(patches, edges, links, static_cast<int>(i));
   }
   return {};
 }

@@ -74,14 +74,14 @@ constexpr double kShortestEdge =
 struct UnmatchedEdge {
   int patch = -1, edge = -1;                  // an edge that nothing lies on; -1 when every edge is matched
   int nearest_patch = -1, nearest_edge = -1;  // the free edge that comes closest ...
-  double gap = 0;                             // ... and the largest distance between the two
+  double gap = 0;                             // ... and how far the first reaches from it
 };
 
 // Pairs the edges of `patches` whose curves agree within `tolerance` (length), closest pairs first; an edge
 // whose control points all lie within the tolerance is collapsed. Curves are compared as curves, so the two
 // sides may be parametrised differently: the map between them goes into the link; the whole of one edge must
-// lie on the whole of the other (no T-junctions). O(n log n) for n patches. Returns the first edge left over,
-// if any.
+// lie on the whole of the other (t_junctions.h finds where it does not). O(n log n) for n patches. Returns
+// the first edge left over, if any.
 UnmatchedEdge connect_patches(const std::vector<BezierPatch>& patches, double tolerance, PatchLinks& links);
 
 // The worst of a body's joints.

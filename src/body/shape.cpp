@@ -8,10 +8,13 @@
 #include "body/bounds.h"
 #include "body/connectivity.h"
 #include "body/convexity.h"
+#include "body/joints.h"
 #include "body/mass_properties.h"
 #include "body/profile_turn.h"
 #include "body/rounding.h"
 #include "body/surface_bounds.h"
+#include "body/t_junctions.h"
+#include "nurbs/knot_removal.h"
 #include "nurbs/tolerances.h"
 
 namespace nurbs {
@@ -20,9 +23,15 @@ namespace {
 // Diagonal of the box, in the file's units: second moments and squared forms stay within doubles.
 constexpr double kLeastSize = 1e-30, kMostSize = 1e30;
 
+// Cuts at T-junctions may go round and round a body: they end at so many patches.
+constexpr size_t kMostCut = 256, kMostCutOfOne = 8;
+constexpr double kGapOfDigits = 1e-6;  // of the tolerance: round-off of joined spans
+constexpr double kSameCut = 1e-6;      // of an edge: cuts so near are tried as one
+
 // A shape under construction, with what its messages need.
 struct Draft {
   Shape shape;
+  std::vector<NurbsSurface> cut;  // the shape's surfaces with the knots at which they are cut into patches
   std::vector<BezierPiece>
       pieces;                // knot rectangle of each Bezier patch; their patches are moved to the shape
   std::vector<bool> turned;  // surfaces whose u and v were exchanged
@@ -60,8 +69,8 @@ void split(Draft& draft) {
   s.patches.clear();
   s.surface_of_patch.clear();
   draft.pieces.clear();
-  for (size_t i = 0; i < s.surfaces.size(); ++i) {
-    for (BezierPiece& piece : split_to_bezier(s.surfaces[i])) {
+  for (size_t i = 0; i < draft.cut.size(); ++i) {
+    for (BezierPiece& piece : split_to_bezier(draft.cut[i])) {
       s.patches.push_back(std::move(piece.patch));
       s.surface_of_patch.push_back(static_cast<int>(i));
       draft.pieces.push_back(std::move(piece));
@@ -84,22 +93,94 @@ std::string edge_name(const Draft& draft, int patch, int edge) {
   return name + " (" + (edge < 2 ? "v=" : "u=") + number(from) + ".." + number(to) + ")";
 }
 
-void connect(Draft& draft) {
+// Inserts knots where corners of other patches lie inside edges that nothing matches. A knot runs across its
+// surface, and may end inside an edge of the next: false once there is no such place.
+bool cut_at_t_junctions(Draft& draft, double tolerance) {
+  const Shape& s = draft.shape;
+  const std::vector<TJunction> cuts = find_t_junctions(s.patches, s.links, tolerance);
+  for (const TJunction& cut : cuts) {
+    const BezierPiece& piece = draft.pieces[cut.patch];
+    NurbsSurface& surface = draft.cut[s.surface_of_patch[cut.patch]];
+    const bool in_v = cut.edge < 2;
+    const double from = in_v ? piece.v0 : piece.u0, to = in_v ? piece.v1 : piece.u1,
+                 at = from + cut.t * (to - from);
+    const std::vector<double>& knots = in_v ? surface.knots_v : surface.knots_u;
+    const auto is_same = [&](double knot) {
+      return knot > from && knot < to && std::abs(knot - at) <= kSameCut * (to - from);
+    };
+    if (std::any_of(knots.begin(), knots.end(), is_same)) continue;
+    surface = in_v ? swap_uv(insert_knot_u(swap_uv(surface), at)) : insert_knot_u(surface, at);
+  }
+  return !cuts.empty();
+}
+
+double join_tolerance(const Shape& s) {
+  return kJoinTolerance * diagonal(s.patches);
+}
+
+// No two sides of a joint, and no points of a pole, are further apart.
+double widest_gap(const Shape& s) {
+  double widest = 0;
+  visit_joints(s.links, [&](int p, int e) {
+    const EdgeLink& link = s.links[p][e];
+    widest = std::max(widest, link.collapsed ? bound_collapsed_edge(s.patches[p], e)
+                                             : bound_joint_gap(s.patches[p], e, s.patches[link.patch], link));
+  });
+  return widest;
+}
+
+// Cuts the surfaces at as few of their knots as they can do with; false, and nothing changes, if they need
+// all or the rest of them does not close the body as well.
+bool connect_without_needless_knots(Draft& draft) {
+  std::vector<NurbsSurface> simpler;
+  int removed = 0;
+  for (const NurbsSurface& surface : draft.shape.surfaces) {
+    int in_u = 0, in_v = 0;
+    simpler.push_back(swap_uv(remove_knots_u(swap_uv(remove_knots_u(surface, &in_u)), &in_v)));
+    removed += in_u + in_v;
+  }
+  if (removed == 0) return false;
+  const double tolerance = join_tolerance(draft.shape);
+  const auto gap = [&] {
+    const bool closed = connect_patches(draft.shape.patches, tolerance, draft.shape.links).patch < 0;
+    return closed ? widest_gap(draft.shape) : kInfinity;
+  };
+  const double own = gap();
+  std::swap(draft.cut, simpler);
+  split(draft);
+  if (gap() <= std::max(std::isfinite(own) ? 2 * own : 0, kGapOfDigits * tolerance)) return true;
+  std::swap(draft.cut, simpler);
+  split(draft);
+  return false;
+}
+
+// Joins the surfaces cut at their own knots, and where corners meet edges at such as these take.
+void connect_cut_at_knots(Draft& draft) {
   Shape& s = draft.shape;
-  const double size = diagonal(s.patches);
+  const double tolerance = join_tolerance(s);
+  UnmatchedEdge left = connect_patches(s.patches, tolerance, s.links);
+  if (left.patch < 0) return;
+  std::string message = edge_name(draft, left.patch, left.edge) + " has no partner: the surface is open";
+  if (left.nearest_patch >= 0) {
+    message += ", the nearest free edge is " + edge_name(draft, left.nearest_patch, left.nearest_edge) +
+               ", " + number(left.gap) + " away (allowed " + number(tolerance) + ")";
+  }
+  const size_t most = kMostCutOfOne * s.patches.size() + kMostCut;
+  while (left.patch >= 0 && s.patches.size() <= most && cut_at_t_junctions(draft, tolerance)) {
+    split(draft);
+    left = connect_patches(s.patches, tolerance, s.links);
+  }
+  if (left.patch >= 0) throw ShapeError(message);
+}
+
+void connect(Draft& draft) {
+  const double size = diagonal(draft.shape.patches);
   if (!(size > 0)) throw ShapeError("all control points coincide");
   if (!(size >= kLeastSize && size <= kMostSize)) {
     throw ShapeError("the control points' box has a diagonal of " + number(size) + ", must be " +
                      number(kLeastSize) + ".." + number(kMostSize));
   }
-  const UnmatchedEdge left = connect_patches(s.patches, kJoinTolerance * size, s.links);
-  if (left.patch < 0) return;
-  std::string message = edge_name(draft, left.patch, left.edge) + " has no partner: the surface is open";
-  if (left.nearest_patch >= 0) {
-    message += ", the nearest free edge is " + edge_name(draft, left.nearest_patch, left.nearest_edge) +
-               ", " + number(left.gap) + " away (allowed " + number(kJoinTolerance * size) + ")";
-  }
-  throw ShapeError(message);
+  if (!connect_without_needless_knots(draft)) connect_cut_at_knots(draft);
 }
 
 // One closed body: consistent sides everywhere, and connected.
@@ -126,10 +207,11 @@ void turn_surfaces(Draft& draft, const std::vector<bool>& turn) {
   for (size_t i = 0; i < turn.size(); ++i) {
     if (!turn[i]) continue;
     draft.shape.surfaces[i] = swap_uv(draft.shape.surfaces[i]);
+    draft.cut[i] = swap_uv(draft.cut[i]);
     draft.turned[i] = !draft.turned[i];
   }
   split(draft);
-  connect(draft);
+  connect_cut_at_knots(draft);
 }
 
 void warn_of_turned(Draft& draft) {
@@ -344,6 +426,7 @@ std::uint64_t content_stamp(const Shape& s) {
 
 void build(Draft& draft, const std::optional<Mat3>& gyration) {
   check_surfaces(draft.shape.surfaces);
+  draft.cut = draft.shape.surfaces;
   split(draft);
   connect(draft);
   orient_and_weigh(draft);

@@ -227,6 +227,36 @@ NurbsSurface bezier_surface(int degree_u, int degree_v, std::vector<Vec4> points
   return s;
 }
 
+std::vector<Vec4> bezier_points_u(const NurbsSurface& s, int k, int j) {
+  Column net;
+  for (int i = 0; i <= s.degree_u; ++i) net[i] = s.point(k - s.degree_u + i, j);
+  const Column points = bezier_points(s.knots_u, s.degree_u, k, net);
+  return {points.begin(), points.begin() + s.degree_u + 1};
+}
+
+NurbsSurface insert_knot_u(const NurbsSurface& s, double u) {
+  const int p = s.degree_u, k = find_span(s.knots_u, p, s.size_u, u);
+  const auto repeated = static_cast<int>(std::count(s.knots_u.begin(), s.knots_u.end(), u));
+  NurbsSurface out = s;
+  out.knots_u.insert(out.knots_u.begin() + k + 1, u);
+  ++out.size_u;
+  out.points.resize(static_cast<size_t>(out.size_u) * s.size_v);
+  for (int i = 0; i < out.size_u; ++i) {
+    // Below the span the points stay, above it they move up by one; in it they are weighed.
+    const bool below = i <= k - p, above = i > k - repeated;
+    const double a = below ? 1 : above ? 0 : (u - s.knots_u[i]) / (s.knots_u[i + p] - s.knots_u[i]);
+    for (int j = 0; j < s.size_v; ++j) {
+      if (a == 1)
+        out.point(i, j) = s.point(i, j);
+      else if (a == 0)
+        out.point(i, j) = s.point(i - 1, j);
+      else
+        out.point(i, j) = a * s.point(i, j) + (1 - a) * s.point(i - 1, j);
+    }
+  }
+  return out;
+}
+
 NurbsSurface swap_uv(const NurbsSurface& s) {
   NurbsSurface out;
   out.degree_u = s.degree_v;

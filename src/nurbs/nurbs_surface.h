@@ -51,6 +51,14 @@ struct BezierPiece {
 // false).
 std::vector<BezierPiece> split_to_bezier(const NurbsSurface& surface);
 
+// The Bezier points, homogeneous, over a non-empty span [knots_u[k], knots_u[k + 1]] of the curve that column
+// j of the control net is in u.
+std::vector<Vec4> bezier_points_u(const NurbsSurface& surface, int k, int j);
+
+// The same surface with one more knot of u inside the domain, by Boehm's algorithm (NURBS Book A5.1 for one
+// knot, which needs no clamped ends). `u` must not have its full multiplicity, the degree, yet.
+NurbsSurface insert_knot_u(const NurbsSurface& surface, double u);
+
 // The same surface with u and v exchanged, which turns Su x Sv round.
 NurbsSurface swap_uv(const NurbsSurface& surface);
 

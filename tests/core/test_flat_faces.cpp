@@ -182,19 +182,19 @@ TEST(FlatFaces, prisms_join_fans_to_one_face) {
 }
 
 TEST(FlatFaces, pieces_of_a_face_and_of_an_edge_are_joined) {
-  // A box whose faces are 2 x 2 Bezier pieces each.
-  std::vector<NurbsSurface> body = box(Vec3(1, 0.8, 0.6));
-  for (NurbsSurface& s : body) {
-    s.knots_u = s.knots_v = {0, 0, 0.5, 1, 1};
-    s.size_u = s.size_v = 3;
-    const std::vector<Vec4> old = s.points;
-    s.points.clear();
-    for (int i = 0; i < 3; ++i)
-      for (int j = 0; j < 3; ++j) {
-        const double u = 0.5 * i, v = 0.5 * j;
-        s.points.push_back((1 - u) * ((1 - v) * old[0] + v * old[1]) + u * ((1 - v) * old[2] + v * old[3]));
-      }
-  }
+  // A box whose faces are 2 x 2 surfaces each. (Knots alone would be taken out.)
+  std::vector<NurbsSurface> body;
+  for (const NurbsSurface& face : box(Vec3(1, 0.8, 0.6)))
+    for (int k = 0; k < 4; ++k) {
+      std::vector<Vec4> points;
+      for (int i = 0; i < 2; ++i)
+        for (int j = 0; j < 2; ++j) {
+          const double u = 0.5 * (k / 2 + i), v = 0.5 * (k % 2 + j);
+          points.push_back((1 - u) * ((1 - v) * face.points[0] + v * face.points[1]) +
+                           u * ((1 - v) * face.points[2] + v * face.points[3]));
+        }
+      body.push_back(bezier_surface(1, 1, points));
+    }
   const ShapePointer s = make_shape("pieces", body);
   EXPECT_EQ(s->patches.size(), 24u);
   EXPECT_EQ(s->flats.faces.size(), 6u);

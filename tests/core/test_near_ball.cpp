@@ -174,7 +174,7 @@ NurbsSurface with_knot(const NurbsSurface& s, double knot) {
 TEST(NearBall, dimpled_spheres) {
   Random random(5);
   int found = 0;
-  for (int k = 0; k < 8; ++k) {
+  for (int k = 0; k < 40; ++k) {
     NurbsSurface s = revolved_ellipsoid(1, 1).front();  // poles and a seam
     const auto refine = [&](double at) {
       const double low = s.knots_u[s.degree_u], high = s.knots_u[s.size_u];

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <limits>
 
+#include "nurbs/knot_removal.h"
 #include "nurbs/nurbs_surface.h"
 #include "support/random.h"
 
@@ -145,6 +146,94 @@ TEST(NurbsSurface, EqualWeightsAreDividedOut) {
   }
   s.points[0] *= 1.5;
   EXPECT_TRUE(split_to_bezier(s)[0].patch.rational);
+}
+
+TEST(NurbsSurface, KnotsInsertedLeaveTheSurface) {
+  Random random(8);
+  for (int trial = 0; trial < 200; ++trial) {
+    const NurbsSurface s =
+        random_surface(random, random.whole(1, 9), random.whole(1, 9), trial % 2, trial % 3);
+    NurbsSurface finer = s;
+    for (int k = 0; k < 6; ++k) {
+      double u = random.uniform(0, 3);
+      if (k % 2) {  // one that is there
+        u = finer.knots_u[random.whole(s.degree_u + 1, finer.size_u)];
+        if (std::count(finer.knots_u.begin(), finer.knots_u.end(), u) >= s.degree_u || u >= 3) continue;
+      }
+      finer = insert_knot_u(finer, u);
+      ASSERT_EQ(find_defect(finer), "");
+      ASSERT_EQ(std::count(finer.knots_u.begin(), finer.knots_u.end(), u) > 0, true);
+    }
+    EXPECT_GT(finer.size_u, s.size_u);
+    for (int k = 0; k < 10; ++k) {
+      const double u = random.uniform(0, 3), v = random.uniform(0, 3);
+      EXPECT_LT((evaluate(finer, u, v) - evaluate(s, u, v)).norm(), 1e-13) << "trial " << trial;
+    }
+  }
+}
+
+int spans_in_u(const NurbsSurface& s) {
+  int spans = 0;
+  for (int k = s.degree_u; k < s.size_u; ++k) spans += s.knots_u[k] < s.knots_u[k + 1];
+  return spans;
+}
+
+// Knots inserted into surfaces of one and of more spans, some next to an end, are removed; those that
+// separate two polynomials stay.
+TEST(KnotRemoval, RemovesWhatRefinementAdded) {
+  Random random(9);
+  int left = 0;
+  for (int trial = 0; trial < 600; ++trial) {
+    const int degree = random.whole(1, kMaxDegree);
+    NurbsSurface s = random_surface(random, degree, random.whole(1, 3), trial % 2, trial % 3);
+    if (trial % 4 == 0) {
+      s.size_u = degree + 1;
+      s.knots_u.assign(2 * degree + 2, 0);
+      std::fill(s.knots_u.begin() + degree + 1, s.knots_u.end(), 3);
+      s.points.resize(static_cast<size_t>(s.size_u) * s.size_v);
+    }
+    int removed = -1;
+    const NurbsSurface same = remove_knots_u(s, &removed);
+    EXPECT_EQ(removed, 0);
+    EXPECT_EQ(same.points, s.points);
+    NurbsSurface finer = s;
+    const int added = random.whole(1, 5);
+    for (int k = 0; k < added; ++k) {
+      const double u = random.below(3) ? random.uniform(0, 3) : 3 * random.log_uniform(1e-9, 1e-2);
+      const int repeated = random.whole(1, degree);
+      for (int i = 0; i < repeated; ++i) finer = insert_knot_u(finer, u);
+    }
+    const NurbsSurface simpler = remove_knots_u(finer, &removed);
+    EXPECT_LE(removed, added);
+    left += added - removed;
+    if (removed == added) {
+      EXPECT_EQ(spans_in_u(simpler), spans_in_u(s));
+    }
+    EXPECT_EQ(find_defect(simpler), "");
+    for (int k = 0; k < 20; ++k) {
+      const double u = random.uniform(0, 3), v = random.uniform(0, 3);
+      EXPECT_LT((evaluate(simpler, u, v) - evaluate(s, u, v)).norm(), 1e-13) << "trial " << trial;
+    }
+  }
+  EXPECT_LT(left, 20);  // by round-off
+}
+
+// Weights of the union would be too far apart, or negative: half a circle and more.
+TEST(KnotRemoval, KeepsArcsShort) {
+  const auto arc = [](double angle) {  // about the middle of it
+    const double w = std::cos(0.5 * angle), s = std::sin(0.5 * angle);
+    NurbsSurface out = bezier_surface(2, 1, {});
+    for (const Vec3& p : {Vec3(w, -s, 1), Vec3(1, 0, w), Vec3(w, s, 1)})
+      for (double z : {0, 1}) out.points.emplace_back(p[0], p[1], p[2] * z, p[2]);
+    return out;
+  };
+  int removed = 0;
+  for (double angle : {1.5, 2.5}) {
+    remove_knots_u(insert_knot_u(arc(angle), 0.5), &removed);
+    EXPECT_EQ(removed, 1) << angle;
+  }
+  remove_knots_u(insert_knot_u(arc(3.0), 0.5), &removed);
+  EXPECT_EQ(removed, 0);
 }
 
 TEST(NurbsSurface, SwapExchangesTheParameters) {

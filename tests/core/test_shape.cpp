@@ -368,19 +368,101 @@ TEST(Connectivity, OpenSurfaceNamesPatchAndEdge) {
       << error_of(half);
 }
 
-TEST(Connectivity, EdgesSplitDifferentlyAreRefused) {
-  Surfaces body = box({1, 1, 1});
-  NurbsSurface& s = body[0];  // the same face with a knot line in the middle
-  NurbsSurface split = s;
-  split.size_u = 3;
-  split.knots_u = {0, 0, 0.5, 1, 1};
-  split.points.clear();
-  for (int i = 0; i < 3; ++i) {
-    for (int j = 0; j < 2; ++j)
-      split.points.push_back((1 - 0.5 * i) * s.point(0, j) + 0.5 * i * s.point(1, j));
+// The part of a surface from u = from to u = to, as a surface of its own.
+NurbsSurface part_in_u(NurbsSurface s, double from, double to) {
+  for (double u : {from, to})
+    if (u > s.knots_u[s.degree_u] && u < s.knots_u[s.size_u])
+      for (int k = 0; k < s.degree_u; ++k) s = insert_knot_u(s, u);
+  NurbsSurface out = s;
+  out.knots_u.clear();
+  out.points.clear();
+  for (double knot : s.knots_u)
+    if (knot >= from && knot <= to) out.knots_u.push_back(knot);
+  while (std::count(out.knots_u.begin(), out.knots_u.end(), from) <= s.degree_u)
+    out.knots_u.insert(out.knots_u.begin(), from);
+  while (std::count(out.knots_u.begin(), out.knots_u.end(), to) <= s.degree_u) out.knots_u.push_back(to);
+  out.size_u = static_cast<int>(out.knots_u.size()) - s.degree_u - 1;
+  const auto last = std::upper_bound(s.knots_u.begin(), s.knots_u.end(), from) - s.knots_u.begin() - 1;
+  for (int i = 0; i < out.size_u; ++i)
+    for (int j = 0; j < s.size_v; ++j)
+      out.points.push_back(s.point(static_cast<int>(last) - s.degree_u + i, j));
+  return out;
+}
+
+// Bodies with smooth, sharp and closing joints, and with poles.
+std::vector<Surfaces> bodies_to_cut() {
+  return {box({1, 2, 3}),
+          exact_ellipsoid({1, 2, 3}),
+          capsule(1, 2),
+          revolve({{0, -1}, {1, -1}, {1, 1}, {0, 1}}),
+          rounded_box({1, 1.5, 2}, 0.3),
+          pebble(),
+          tablet(1, 0.5, 0.1),
+          revolve({{0, -1}, {1, -1}, {1, 0}, {0, 1}})};
+}
+
+// Knots that refinement has left, next to the ends too, are not where a body is cut.
+TEST(Connectivity, NeedlessKnotsAreRemoved) {
+  Random random(11);
+  for (const Surfaces& whole : bodies_to_cut()) {
+    const auto expected = build(whole);
+    for (double share : {0.4, 0.03, 1e-7}) {
+      Surfaces body = whole;
+      for (NurbsSurface& s : body)
+        for (int k = 0; k < 4; ++k) {
+          const double from = s.knots_u[s.degree_u], length = s.knots_u[s.size_u] - from;
+          s = swap_uv(insert_knot_u(s, from + length * (k < 2 ? share : 1 - share)));
+        }
+      const auto refined = build(body);
+      EXPECT_EQ(refined->patches.size(), expected->patches.size());
+      EXPECT_EQ(refined->joint_slack, expected->joint_slack);
+      EXPECT_NEAR(refined->mass.volume, expected->mass.volume, 1e-13 * expected->mass.volume);
+      EXPECT_EQ(refined->surfaces[0].knots_u, body[0].knots_u);
+    }
   }
-  s = split;
-  EXPECT_TRUE(contains(error_of(body), "has no partner")) << error_of(body);
+}
+
+// Knots on one side of a joint only, and faces in parts that end inside others' edges: both sides are cut.
+TEST(Connectivity, TJunctionsAreCut) {
+  Random random(10);
+  for (const Surfaces& whole : bodies_to_cut()) {
+    const auto expected = build(whole);
+    for (int trial = 0; trial < 6; ++trial) {
+      Surfaces body = whole;
+      for (int k = 0; k <= trial % 3; ++k) {
+        NurbsSurface& s = body[random.below(body.size())];
+        if (random.below(2)) s = swap_uv(swap_uv(reverse_u(s)));
+        if (random.below(2)) s = swap_uv(reverse_u(s));
+        const double from = s.knots_u[s.degree_u], length = s.knots_u[s.size_u] - from;
+        const double at = from + length * random.uniform(0.05, 0.95);
+        if (trial < 3) {
+          s = insert_knot_u(s, at);
+        } else {
+          const NurbsSurface rest = part_in_u(s, at, from + length);
+          s = part_in_u(s, from, at);
+          body.push_back(rest);
+        }
+      }
+      std::shared_ptr<const Shape> cut;
+      ASSERT_NO_THROW(cut = build(body)) << trial;
+      EXPECT_NEAR(cut->mass.volume, expected->mass.volume, 1e-13 * expected->mass.volume);
+      EXPECT_LT(cut->patches.size(), 8 * expected->patches.size());
+      for (int k = 0; k < 20; ++k) {
+        const Vec3 n = random.direction();
+        EXPECT_NEAR(find_support(*cut, n).h, find_support(*expected, n).h, 1e-13 * expected->bounding_radius);
+      }
+    }
+  }
+}
+
+// A part of a face that is missing is missed, whatever else is cut.
+TEST(Connectivity, OpenBodiesWithTJunctionsAreRefused) {
+  Surfaces body = box({1, 1, 1});
+  body.push_back(part_in_u(body[0], 0, 0.4));
+  body[0] = part_in_u(body[0], 0.4, 1);
+  EXPECT_EQ(error_of(body), "accepted");
+  body.pop_back();
+  EXPECT_TRUE(contains(error_of(body), "has no partner: the surface is open")) << error_of(body);
 }
 
 TEST(Connectivity, TwoBodiesAreRefused) {
