@@ -83,8 +83,8 @@ int nearest_face(const FlatFeatures& features, const Vec3& d, double cosine);
 // The straight line of constant normal through a surface point, across patches as long as it goes straight
 // on; or through one beside it: patches that the point lies on the joint with are tried, too, and those whose
 // lines end at a joint with its own, wherever on that it is, as next to a rounded rim a small turn leads to
-// them. Of several the one whose lower end is highest along d. False where there is none, or none whose
-// normal is within `angle` (rad) of d.
+// them. Of several the one whose lower end is highest along d; of those that meet at a cone's tip the one
+// whose other end is. False where there is none, or none whose normal is within `angle` (rad) of d.
 struct RuledLine {
   Vec3 ends[2];
 };

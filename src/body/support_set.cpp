@@ -12,6 +12,7 @@ namespace {
 
 constexpr double kBesideJoint = 1e-7;    // a parameter this near 0 or 1 may belong to the neighbour
 constexpr double kStraightOn = 1e-8;     // rad, between the pieces of a line, and of their normals
+constexpr double kTopParameter = 1e-15;  // to which the highest point of an edge is known
 constexpr int kMostPieces = 16;          // patches that a line may cross to each side
 constexpr double kLineAngle = M_PI / 4;  // nor is a line whose normal is further away
 constexpr double kFaceCosine = 0.5;      // a face further away than 60 degrees is not asked
@@ -69,6 +70,56 @@ bool line_through(const Shape& shape, SurfacePoint at, const Vec3& d, double ang
   return true;
 }
 
+// Whether a point is where all rulings of its patch meet.
+bool is_at_tip(const Shape& shape, const SurfacePoint& at) {
+  const Ruling ruling = shape.flats.ruling[at.patch];
+  if (ruling == Ruling::none) return false;
+  const double t = ruling == Ruling::along_u ? at.u : at.v;
+  return std::min(t, 1 - t) <= kBesideJoint && shape.links[at.patch][end_edge(ruling, t > 0.5)].collapsed;
+}
+
+// Where d . x is highest on an edge whose other points fall off to both sides: by the sign of the slope.
+double top_of_edge(const BezierPatch& patch, int edge, const Vec3& d) {
+  const auto slope = [&](double t) {
+    const Vec2 at = edge_parameters(edge, t);
+    const Jet1 j = evaluate1(patch, at[0], at[1]);
+    return d.dot(edge < 2 ? j.sv : j.su);
+  };
+  if (!(slope(0) > 0)) return 0;
+  if (!(slope(1) < 0)) return 1;
+  double low = 0, high = 1;
+  while (high - low > kTopParameter) {
+    const double middle = 0.5 * (low + high);
+    (slope(middle) > 0 ? low : high) = middle;
+  }
+  return 0.5 * (low + high);
+}
+
+// Of the rulings that meet at a tip, which has the support, the one whose other end is highest along d. `at`:
+// the tip, as one of the patches round it has it.
+SurfacePoint at_tip(const Shape& shape, SurfacePoint at, const Vec3& d) {
+  int from = -1;  // the side by which the patch was entered
+  for (int piece = 0; piece < kMostPieces; ++piece) {
+    const Ruling ruling = shape.flats.ruling[at.patch];
+    const bool along_u = ruling == Ruling::along_u;
+    const double tip = std::round(along_u ? at.u : at.v);
+    double& round = along_u ? at.v : at.u;
+    round = top_of_edge(shape.patches[at.patch], end_edge(ruling, tip == 0), d);
+    if (round > 0 && round < 1) return at;
+    const int side = end_edge(along_u ? Ruling::along_v : Ruling::along_u, round == 1);
+    const EdgeLink& link = shape.links[at.patch][side];
+    if (side == from || link.patch < 0 || link.collapsed) return at;
+    const Ruling next = shape.flats.ruling[link.patch];
+    if (next == Ruling::none || link.edge == end_edge(next, false) || link.edge == end_edge(next, true))
+      return at;
+    const SurfacePoint there = across(shape.patches, link, at, side);
+    if (!is_at_tip(shape, there)) return at;
+    from = link.edge;
+    at = there;
+  }
+  return at;
+}
+
 void set_point(SupportSet& set, int i, const Vec3& point, int vertex) {
   set.point[i] = point;
   set.vertex[i] = vertex;
@@ -110,7 +161,7 @@ void each_line(const Shape& shape, const SurfacePoint& at, const Vec3& d, double
     RuledLine line;
     if (line_through(shape, place, d, angle, &line)) visit(line);
   };
-  try_at(at);
+  try_at(is_at_tip(shape, at) ? at_tip(shape, at, d) : at);
   for (int edge = 0; edge < 4; ++edge) {
     const double off = edge == 0 ? at.u : edge == 1 ? 1 - at.u : edge == 2 ? at.v : 1 - at.v;
     const EdgeLink& link = shape.links[at.patch][edge];

@@ -356,6 +356,9 @@ class ContactStages {
   void forget_flat(ContactBlock& block, int lane);
   bool serve_flat(ContactBlock& block, int lane, LeftPolygon* left);
   bool remake(ContactBlock& block, int lane, FlatContact& flat, PolygonState& state, double overlap);
+  BodyFrame frame_before(int i, const Vec3& wall) const;
+  double energy_rolled(const FlatContact& flat, double energy, const ContactPolygon& polygon, double holds,
+                       int a, int b, const PointMemories& memory) const;
   double kept_energy(const FlatContact& flat, const PolygonState& state, const ContactPolygon& polygon,
                      const PolygonState& fresh, int a, int b, const PointMemories& memory,
                      double holds) const;

@@ -368,14 +368,38 @@ double ContactStages::arrival(int a, int b, const Vec3& normal, const Vec3& arm_
   return kArrival * step_.dt * std::max(0.0, -normal.dot(velocity));
 }
 
-// What of a polygon's energy goes to another one, which would hold `holds`: springs keep theirs. An old line
-// that rolled has left the place where it bore.
+// Where a body, or the wall, was a step ago.
+BodyFrame ContactStages::frame_before(int i, const Vec3& wall) const {
+  BodyFrame f = placed(*step_.bodies, wall, i);
+  const BodyRecord& r = record(i);
+  f.x -= step_.dt * load(r.velocity);
+  const Vec3 turn = -0.5 * step_.dt * (load(r.spin) + load(r.spin_before));
+  const double angle = turn.norm();
+  if (angle > 0) f.axes = Eigen::AngleAxisd(angle, turn / angle).toRotationMatrix() * f.axes;
+  return f;
+}
+
+// The energy of a line's points once the line has rolled on to where `polygon` is. The points that stay
+// behind are lifted, which is of second order in the step and no work of the contact: it would grow softer
+// with every step. The new points were as far from bearing a step ago, so that the mean of what both
+// polygons' energies have changed by is the work, whatever a line's ends do: run askew, as on an oblique
+// cone, or slide along it, as where the other body's line ends.
+double ContactStages::energy_rolled(const FlatContact& flat, double energy, const ContactPolygon& polygon,
+                                    double holds, int a, int b, const PointMemories& memory) const {
+  const Vec3 wall = wall_frame(a);
+  const BodyFrame first = frame_before(a, wall), second = frame_before(b, wall);
+  const double old_before =
+                   energy_of(flat.polygon, evaluate(flat.polygon, first, second), a, b, point_memories(flat)),
+               new_before = energy_of(polygon, evaluate(polygon, first, second), a, b, memory);
+  return std::max(0.0, energy + 0.5 * ((holds - new_before) - (energy - old_before)));
+}
+
+// What of a polygon's energy goes to another one, which would hold `holds`: springs keep theirs.
 double ContactStages::kept_energy(const FlatContact& flat, const PolygonState& state,
                                   const ContactPolygon& polygon, const PolygonState& fresh, int a, int b,
                                   const PointMemories& memory, double holds) const {
-  const bool rolled = rolled_along(flat.polygon, polygon);
-  const double held = energy_of(flat.polygon, rolled ? after_rolling(flat.polygon, polygon, fresh) : state, a,
-                                b, point_memories(flat));
+  double held = energy_of(flat.polygon, state, a, b, point_memories(flat));
+  if (rolled_along(flat.polygon, polygon)) held = energy_rolled(flat, held, polygon, holds, a, b, memory);
   if (!(holds > held)) return held;
   const int deepest = static_cast<int>(std::min_element(fresh.gap, fresh.gap + fresh.count) - fresh.gap);
   const Vec3 &arm_a = fresh.arm_a[deepest], &arm_b = fresh.arm_b[deepest];

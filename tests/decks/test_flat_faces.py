@@ -32,7 +32,7 @@ neigh_modify delay 0 {rebuild}
 pair_style gran/nurbs
 pair_coeff * * {law}
 fix floor all wall/nurbs {wall} {law}
-fix weight all gravity 9.81 vector {gravity}
+fix weight all gravity {weight} vector {gravity}
 fix motion all nve/nurbs
 compute ke all ke
 compute er all erotate/nurbs
@@ -59,7 +59,7 @@ def turned(axis, degrees):
 
 
 def run(atoms, steps, velocities=(), gravity="0 0 -1", law=LAW, dt=5e-5, every=None, ranks=1, shape=None, before="",
-        mesh=None, rebuild=""):
+        mesh=None, rebuild="", weight=G):
     files = {"box.json": shape or deck.shape_file("box", *HALF),
              "bodies.data": deck.data_file(atoms, velocities, ((-3, 3), (-3, 3), (-1, 6)))}
     wall = FLOOR
@@ -67,7 +67,7 @@ def run(atoms, steps, velocities=(), gravity="0 0 -1", law=LAW, dt=5e-5, every=N
         files["floor.stl"] = mesh
         before += "\nfix m all mesh/surface file floor.stl type 1"
         wall = "mesh m"
-    return deck.run_ok(DECK.format(shapes="box.json", wall=wall, law=law, gravity=gravity, dt=dt, steps=steps, before=before, rebuild=rebuild,
+    return deck.run_ok(DECK.format(shapes="box.json", wall=wall, law=law, gravity=gravity, weight=weight, dt=dt, steps=steps, before=before, rebuild=rebuild,
                                    every=every or max(1, steps // 20)), files=files, ranks=ranks)
 
 
@@ -80,21 +80,25 @@ def sunk(mass=MASS):
     return mass * G / 2e7
 
 
-def cylinder(radius, half):
-    """Shape file of a cylinder about z: a side and two caps, each a disc whose centre is a pole."""
+def ringed(*rings):
+    """Shape file of the body between rings (semi-axes x and y, centre x and z) from one tip or pole to the other."""
     r2 = float(np.sqrt(0.5))
     circle = [(1, 0), (1, 1), (0, 1), (-1, 1), (-1, 0), (-1, -1), (0, -1), (1, -1), (1, 0)]
     weights = [1.0 if k % 2 == 0 else r2 for k in range(9)]
     knots = [0, 0, 0, 1, 1, 2, 2, 3, 3, 4, 4, 4]
 
-    def patch(rows):  # two rings of (radius, z)
-        points = [[r * x, r * y, z] for r, z in rows for x, y in circle]
+    def patch(*rows):
+        points = [[c + rx * x, ry * y, z] for rx, ry, c, z in rows for x, y in circle]
         return {"degree_u": 1, "degree_v": 2, "knotvector_u": [0, 0, 1, 1], "knotvector_v": knots, "size_u": 2,
                 "size_v": 9, "control_points": {"points": points, "weights": weights * 2}}
 
-    data = [patch([(radius, half), (radius, -half)]), patch([(0.0, half), (radius, half)]),
-            patch([(radius, -half), (0.0, -half)])]
-    return json.dumps({"shape": {"type": "surface", "count": 3, "data": data}})
+    data = [patch(*pair) for pair in zip(rings, rings[1:])]
+    return json.dumps({"shape": {"type": "surface", "count": len(data), "data": data}})
+
+
+def cylinder(radius, half):
+    """Shape file of a cylinder about z: a side and two caps, each a disc whose centre is a pole."""
+    return ringed((0.0, 0.0, 0, half), (radius, radius, 0, half), (radius, radius, 0, -half), (0.0, 0.0, 0, -half))
 
 
 class Rest(unittest.TestCase):
@@ -177,7 +181,7 @@ class Heap(unittest.TestCase):
                            ("north", "0 2.5 0 0 -1 0")))
         files = {"box.json": deck.shape_file("box", *HALF), "cylinder.json": cylinder(0.4, 0.3),
                  "bodies.data": deck.data_file(atoms, (), ((-3, 3), (-3, 3), (-1, 8)))}
-        r = deck.run_ok(DECK.format(shapes="box.json cylinder.json", wall=FLOOR, law=LAW, gravity="0 0 -1", dt=5e-5,
+        r = deck.run_ok(DECK.format(shapes="box.json cylinder.json", wall=FLOOR, law=LAW, gravity="0 0 -1", weight=G, dt=5e-5,
                                     steps=24000, every=1000, before=walls, rebuild=""), files=files)
         ledger, lost = r.thermo["ledger"], r.thermo["led[3]"][-1] + r.thermo["led[4]"][-1]
         print(f"    heap: ledger off by {np.ptp(ledger) / lost:.1e} of what is dissipated,"
@@ -535,6 +539,57 @@ class Rolling(unittest.TestCase):
         self.assertAlmostEqual(omega.sum(), 20 - 0.4 / inertia * abs(v[2]), delta=0.04)  # arms: 0.4 less half the overlap
         self.assertLess(omega[1], -0.1)
         self.assertLess(ledger, 1e-4)
+
+
+class Cones(unittest.TestCase):
+    """Cones on an ellipse, the tip beside or above its centre: the rim runs askew to the side's lines."""
+
+    def placed(self, a, b, tip, azimuth, normal, along, tilt):
+        """Turns the side's line at an azimuth of the rim to `along`, tilted, and its normal to `normal`; how far the body
+        reaches along the normal, and the turn as matrix and quaternion."""
+        t = np.radians(azimuth)
+        rim, tangent = np.array([a * np.cos(t), b * np.sin(t), 0]), np.array([-a * np.sin(t), b * np.cos(t), 0])
+        line = np.array([tip, 0, 1.0]) - rim
+        n = np.cross(tangent, line) / np.linalg.norm(np.cross(tangent, line))
+        line /= np.linalg.norm(line)
+        n, line = n + tilt * line, line - tilt * n
+        own, lab = ([x / np.linalg.norm(x) for x in pair] for pair in ((n, line), (normal, along)))
+        turn = np.column_stack((*lab, np.cross(*lab))) @ np.column_stack((*own, np.cross(*own))).T
+        w = np.sqrt(max(0, 1 + np.trace(turn))) / 2
+        q = (w, *((turn[k][j] - turn[j][k]) / (4 * w) for j, k in ((1, 2), (2, 0), (0, 1))))
+        angles = np.linspace(0, 2 * np.pi, 20001)
+        body = np.vstack((np.column_stack((a * np.cos(angles), b * np.sin(angles), 0 * angles)), (tip, 0, 1)))
+        return ((body - (tip / 4, 0, 0.25)) @ own[0]).max(), turn, q
+
+    def law(self, mass):
+        return f"kn {1e4 * mass} kt 1 cn 0 ct 0 mu 0"
+
+    def test_cones_that_roll_on_a_plane_keep_their_energy(self):
+        for a, b, tip, azimuth, spin in ((1, 1, 0.8, 45, 0), (1, 1, 0.8, 45, 1), (1, 0.5, 0, 45, 1), (1, 0.5, 0, 90, -1)):
+            reach, turn, q = self.placed(a, b, tip, azimuth, np.array((0, 0, -1)), np.array((1, 0, 0)), 0.003)
+            mass = DENSITY * np.pi * a * b / 3
+            r = run([atom(1, (0, 0, reach + 0.002), q)], 12500, dt=2e-5, law=self.law(mass), weight=1e-12,
+                    velocities=[(1, 0, 0, -0.5, spin, 0, 0)],
+                    shape=ringed((0, 0, tip, 1), (a, b, 0, 0), (0, 0, 0, 0)))
+            kinetic = np.array(r.thermo["kinetic"])
+            self.assertLess(kinetic.min(), 0.7 * kinetic[0])
+            self.assertAlmostEqual(kinetic[-1] / kinetic[0], 1, delta=1e-5)
+
+    def test_cones_side_by_side_keep_their_energy(self):
+        for azimuth, spin in ((20, 0.5), (70, 1), (120, -1)):
+            one = self.placed(1, 0.6, 0.3, azimuth, np.array((1, 0, 0)), np.array((0, 0, 1)), 0.002)
+            other = self.placed(1, 0.6, 0.3, azimuth + 40, np.array((-1, 0, 0)), np.array((0, 0, 1)), -0.001)
+            middles = [turn @ (np.array([0.5 * np.cos(np.radians(az)) + 0.15, 0.3 * np.sin(np.radians(az)), 0.5]) - (0.075, 0, 0.25))
+                       for (_, turn, _), az in ((one, azimuth), (other, azimuth + 40))]
+            side = middles[0] - middles[1]  # the lines' middles beside each other
+            x = np.array([one[0] + other[0] + 0.002, side[1], side[2]])
+            mass = DENSITY * np.pi * 0.6 / 3
+            r = run([atom(1, (0, 0, 3), one[2]), atom(2, x + (0, 0, 3), other[2])], 50000, dt=5e-6, law=self.law(mass),
+                    weight=1e-12, velocities=[(1, 0, 0, 0, 0, 0, spin), (2, -0.5, 0, 0, 0, 0, 0)],
+                    shape=ringed((0, 0, 0.3, 1), (1, 0.6, 0, 0), (0, 0, 0, 0)))
+            kinetic = np.array(r.thermo["kinetic"])
+            self.assertLess(kinetic.min(), 0.8 * kinetic[0])
+            self.assertAlmostEqual(kinetic[-1] / kinetic[0], 1, delta=1e-4)
 
 
 class Crossing(unittest.TestCase):

@@ -157,19 +157,6 @@ bool rolled_along(const ContactPolygon& old, const ContactPolygon& polygon) {
   return true;
 }
 
-PolygonState after_rolling(const ContactPolygon& old, const ContactPolygon& polygon,
-                           const PolygonState& state) {
-  PolygonState rolled = state;
-  rolled.energy = 0;
-  for (int i = 0; i < 2; ++i) {
-    const double t = along(polygon, old.point[i]);
-    rolled.gap[i] = state.gap[0] + t * (state.gap[1] - state.gap[0]);
-    const double overlap = std::max(0.0, -rolled.gap[i]);
-    rolled.energy += 0.5 * old.weight[i] * overlap * overlap;
-  }
-  return rolled;
-}
-
 double continuity_factor(double energy, double full) {
   return energy > 0 && full > 0 ? energy / full : 1;
 }
