@@ -12,6 +12,9 @@
 #include "body/support.h"
 #include "contact/walls/feature_search.h"
 #include "contact/walls/surface_search.h"
+#include "shapes/primitives.h"
+#include "shapes/revolved.h"
+#include "shapes/superellipsoid.h"
 #include "support/bodies.h"
 #include "support/random.h"
 #include "support/solid_families.h"
@@ -260,6 +263,46 @@ TEST(SurfaceSearch, ForceAndEnergyDoNotKnowHowTheMeshIsCut) {
       EXPECT_NEAR((whole.torque - parts.torque).norm(), 0, 1e-6 * size);
       EXPECT_NEAR((whole.force - other.force).norm(), 0, 1e-7 * size);
     }
+}
+
+// Some triangles halved at a side, which the neighbour there knows nothing of.
+Mesh halved(const Mesh& mesh, Random& random) {
+  Mesh fine;
+  for (const Triangle& t : mesh.triangles) {
+    const int k = random.below(3);
+    const Vec3 &a = t[k], &b = t[(k + 1) % 3], &c = t[(k + 2) % 3],
+               middle = a + random.uniform(0.2, 0.8) * (b - a);
+    if (random.below(2)) {
+      fine.add(a, b, c);
+    } else if (random.below(2)) {
+      fine.add(a, middle, c);
+      fine.add(c, middle, b);
+    } else {
+      fine.add(middle, b, c);
+      fine.add(c, a, middle);
+    }
+  }
+  std::shuffle(fine.triangles.begin(), fine.triangles.end(), random.engine());
+  return fine;
+}
+
+// The pieces of a ridge that is cut on one side run either way: a sharp body on it had no contact, or two.
+TEST(SurfaceSearch, SidesMayBeCutOnOneSideOnly) {
+  Random random(17);
+  auto sharper = bodies();
+  sharper.push_back(make_shape("rounded box", rounded_box({1, 0.8, 0.6}, 0.1)));
+  sharper.push_back(make_shape("box", box({1, 0.8, 0.6})));
+  sharper.push_back(make_shape("blocky", convex_superellipsoid({1, 0.8, 0.6}, 4, 1e-2).surfaces));
+  sharper.push_back(make_shape("tablet", tablet(1, 0.6, 0.1)));
+  int off = 0;
+  for (const auto& shape : sharper)
+    for (int round = 0; round < 100; ++round) {
+      const Scene scene = random_scene(shape, random);
+      const Sum whole = search(scene.body, scene.mesh),
+                parts = search(scene.body, halved(scene.mesh, random));
+      off += !((whole.force - parts.force).norm() <= 1e-5 * whole.force.norm() + 1e-12);
+    }
+  EXPECT_LE(off, 5);  // of 700; it was 34
 }
 
 double rounded(double x, int digits) {
@@ -555,6 +598,45 @@ TEST(SurfaceSearch, SharpBodiesAtTheBorderOfAPlateMeetAnyOfItsTriangles) {
   EXPECT_LE(wrong, 1);  // once 6
   EXPECT_GT(missed, 200);
   EXPECT_GT(met, 10000);
+}
+
+// Beside the end of a valley a body may be below the one face's plane, and the valley an edge that stands out
+// on the other side: a needle that touched neither face had a contact deeper than it is thick.
+TEST(SurfaceSearch, NeedlesInAValleyMeetItsFacesOnly) {
+  const auto shape = make_shape("needle", exact_ellipsoid({1, 0.15, 0.15}));
+  Random random(18);
+  int clear = 0, met = 0, phantoms = 0;
+  for (int round = 0; round < 20000; ++round) {
+    const double low = random.uniform(-0.4, -0.1);
+    const Vec3 a(0, -0.8, random.uniform(-0.1, 0.1)), b(0, 0, low), c(-0.8, 0, random.uniform(0, 0.3)),
+        d(0.8, 0, random.uniform(0, 0.3));
+    Mesh mesh;
+    mesh.add(a, b, c);
+    mesh.add(a, d, b);
+    Particle p;
+    p.shape = shape.get();
+    p.q = random.turn();
+    p.x = Vec3(random.uniform(-1, 1), random.uniform(-1.4, 0.4), random.uniform(0, 0.4));
+    const Mat3 to_ball = Vec3(1, 1 / 0.15, 1 / 0.15).asDiagonal() * p.q.toRotationMatrix().transpose();
+    double least = kFarAway;  // to the faces, where the needle is the unit ball
+    for (const Triangle& t : mesh.triangles) {
+      std::vector<Vec3> hull;
+      for (const Vec3& x : t) hull.push_back(to_ball * (x - p.x));
+      least = std::min(least, nearest(hull, Vec3::Zero()).norm());
+    }
+    const Sum found = search(p, mesh);
+    if (least > 1 + 1e-9) {
+      ++clear;
+      EXPECT_EQ(found.count, 0) << round << " " << found.deepest;
+    } else if (least > 0.9 && least < 1 - 1e-9) {
+      ++met;
+      EXPECT_GT(found.count, 0) << round << " " << least;
+      phantoms += least > 0.95 && found.deepest > 0.15;
+    }
+  }
+  EXPECT_GT(clear, 5000);
+  EXPECT_GT(met, 300);
+  EXPECT_LE(phantoms, 2);  // of those that reach round the border of the wall
 }
 
 TEST(SurfaceSearch, RidgeValleyAndVertex) {

@@ -196,23 +196,55 @@ bool SurfaceSearch::is_on_line(int number) const {
   return false;
 }
 
-// Whether the body meets the wall beside a line: it may meet the line beyond, and be deepest over this piece.
-bool SurfaceSearch::meets(const std::vector<Stretch>& line) const {
-  std::vector<Vec3>& corners = workspace().corners;
-  corners.clear();
-  for (const Stretch& piece : line) {
-    const MeshPatch::Edge& e = patch_.edges()[piece.edge];
-    for (int i = e.first_side; i < e.first_side + e.sides; ++i) add_corners(patch_.side(i).cell, &corners);
+// Whether the body meets a face beside a line, from without if it is thinner than it is deep: it may meet the
+// line beyond, and be deepest over this piece; or be in the valley that the line makes on the wall's other
+// side, beside its end.
+bool SurfaceSearch::meets(const std::vector<Stretch>& line, const MeshPatch::Edge& e, const Arc& arc,
+                          double gap) {
+  const Vec3 off = particle_.x - patch_.vertices()[e.v[0]].x;
+  const bool thin = is_thinner(gap);
+  return std::any_of(line.begin(), line.end(), [&](const Stretch& piece) {
+    const MeshPatch::Edge& here = patch_.edges()[piece.edge];
+    for (int i = 0; i < here.sides; ++i) {
+      const Vec3 out = e.sides == 1 || plane_of(here, i) == plane_of(e, 0) ? arc.end(0) : arc.end(1);
+      if ((!thin || out.dot(off) > 0) && meets_cell(patch_.side(here.first_side + i).cell)) return true;
+    }
+    return false;
+  });
+}
+
+// Whether the body comes to its deepest point at a line through a face of it, and not beside that: on the
+// wall's other side the line may be a valley's, that the body has next to nothing of.
+bool SurfaceSearch::enters(const FeatureContact& f, const std::vector<Stretch>& line,
+                           const MeshPatch::Edge& e, const Arc& arc) {
+  if (e.sides == 1 || !is_thinner(f.gap)) return true;
+  const Vec3 off = particle_.x - patch_.vertices()[e.v[0]].x;
+  for (const Stretch& piece : line) {  // beside an end the cone there may say it
+    const MeshPatch::Edge& here = patch_.edges()[piece.edge];
+    for (const int v : here.v) {
+      const double along = (patch_.vertices()[v].x - patch_.vertices()[e.v[0]].x).dot(e.direction);
+      const bool is_end = std::all_of(line.begin(), line.end(), [&](const Stretch& s) {
+        return along < 0.5 * (piece.from + piece.to) ? piece.from <= s.from : piece.to >= s.to;
+      });
+      const double past =
+          along < 0.5 * (piece.from + piece.to) ? along - off.dot(e.direction) : off.dot(e.direction) - along;
+      if (is_end && past > 0 && cone_at(v) == Cone::outside) return true;
+    }
   }
-  return !misses(corners);
+  double way = 0;
+  int side = -1;
+  for (int i = 0; i < 2; ++i) {
+    const double from = arc.end(i).dot(off), to = arc.end(i).dot(off + f.on_body);
+    if (from > 0 && to < 0 && from / (from - to) > way) way = from / (from - to), side = i;
+  }
+  return side < 0 || cell_with(plane_of(e, side), particle_.x + way * f.on_body) >= 0;
 }
 
 // ... and at a vertex: that none of its normals parts them is true also of a vertex on the wall's far side.
 bool SurfaceSearch::meets(const MeshPatch::Vertex& v) const {
-  std::vector<Vec3>& corners = workspace().corners;
-  corners.clear();
-  for (int i = 0; i < v.cells; ++i) add_corners(patch_.cell_at(v.first_cell + i), &corners);
-  return !misses(corners);
+  for (int i = 0; i < v.cells; ++i)
+    if (meets_cell(patch_.cell_at(v.first_cell + i))) return true;
+  return false;
 }
 
 // An edge that stands out, with those that go straight on from it.
@@ -258,7 +290,8 @@ void SurfaceSearch::touch_outer_edge(int number, const Arc& arc, bool active) {
   }
   int owner = -1;
   for (const Stretch& piece : line) {
-    edges_[piece.edge].state = f.along < piece.from ? MetEdge::before : MetEdge::beyond;
+    const bool same_way = patch_.edges()[piece.edge].direction.dot(e.direction) > 0;
+    edges_[piece.edge].state = (f.along < piece.from) == same_way ? MetEdge::before : MetEdge::beyond;
     if (f.along > low && f.along < high && f.along >= piece.from && f.along <= piece.to &&
         (owner < 0 || piece.edge < owner))
       owner = piece.edge;
@@ -276,7 +309,7 @@ void SurfaceSearch::touch_outer_edge(int number, const Arc& arc, bool active) {
     return leads_in(beside[side], e, side, arc) || deeper(beside[side], f.gap);
   };
   if ((end < 0 || lies) && owner >= 0 && gives_way(0) && gives_way(1) &&
-      !(e.sides == 1 && covered(f, line)) && meets(line)) {
+      !(e.sides == 1 && covered(f, line)) && meets(line, e, arc, f.gap) && enters(f, line, e, arc)) {
     edges_[owner].state = MetEdge::along;
     const int contact = edges_[owner].contact = add_edge(f, 1, patch_.edges()[owner], SurfaceContact::edge);
     for (const SurfaceContact* other : beside) drop(other, contact);

@@ -58,7 +58,7 @@ struct Workspace {
   std::vector<MetEdge> edges;
   std::vector<int> active;
   std::vector<Stretch> line;
-  std::vector<Vec3> corners, ways;  // ways: that lead away from a vertex
+  std::vector<Vec3> corners, ways;  // of a cell; that lead away from a vertex
 };
 Workspace& workspace();
 
@@ -112,8 +112,9 @@ class SurfaceSearch {
   Vec3 crossing(int number, const Vec3& deepest, double gap) const;
   bool in_cell(const MeshPatch::Cell& cell, const Vec3& x) const;
   void touch_face(int number);
-  void add_corners(int cell, std::vector<Vec3>* corners) const;
-  bool misses(const std::vector<Vec3>& corners) const;
+  bool is_thinner(double gap) const { return -gap > particle_.scale * particle_.shape->inner_radius; }
+  bool reaches_round(int number, const Vec3& deepest, double gap) const;
+  bool meets_cell(int number) const;
   bool passes_by(int number, const Vec3& deepest, double gap) const;
   bool add_plane(int number, int triangle, bool flat, double gap, const Vec3& on_body);
   int add(const SurfaceContact& c);
@@ -159,8 +160,10 @@ class SurfaceSearch {
   const std::vector<Stretch>& straight_on(int number);
   bool same_planes(const MeshPatch::Edge& a, const MeshPatch::Edge& b) const;
   bool is_on_line(int number) const;
-  bool meets(const std::vector<Stretch>& line) const;
+  bool meets(const std::vector<Stretch>& line, const MeshPatch::Edge& e, const Arc& arc, double gap);
   bool meets(const MeshPatch::Vertex& v) const;
+  bool enters(const FeatureContact& f, const std::vector<Stretch>& line, const MeshPatch::Edge& e,
+              const Arc& arc);
   void touch_outer_edge(int number, const Arc& arc, bool active);
   bool touch_outer_vertex(int number, const Vec3& guess);
 

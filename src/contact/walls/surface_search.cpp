@@ -363,14 +363,10 @@ int SurfaceSearch::cell_above_valley(int number) const {
 // Whether the body meets a cell of the plane.
 bool SurfaceSearch::meets_cells(int number) const {
   const MeshPatch::Plane& plane = patch_.planes()[number];
-  std::vector<Vec3>& corners = workspace().corners;
   for (int i = 0; i < plane.cells; ++i) {
     const int here = patch_.cell_in(plane.first + i);
     const Vec3 y = nearest(patch_.cells()[here], plane, particle_.x);
-    if (!((particle_.x - y).norm() < radius_)) continue;
-    corners.clear();
-    add_corners(here, &corners);
-    if (!misses(corners)) return true;
+    if ((particle_.x - y).norm() < radius_ && meets_cell(here)) return true;
   }
   return false;
 }
@@ -415,37 +411,52 @@ bool SurfaceSearch::passes_by(int number, const Vec3& deepest, double gap) const
   if (planes_[number].normal.dot(deepest) < 0 && cell_with(number, crossing(number, deepest, gap)) >= 0)
     return false;
   const MeshPatch::Plane& plane = patch_.planes()[number];
-  std::vector<Vec3>& corners = workspace().corners;
   const Vec3 x = particle_.x + deepest;
   if (cell_with(number, x) < 0) return false;
-  if (meets_cells(number)) return false;
+  if (meets_cells(number)) return reaches_round(number, deepest, gap);
   // A sharp body may be in the wall by a neighbour of the cell that it is over, and meet the face nowhere.
   for (int i = 0; i < plane.cells; ++i) {
     const int here = patch_.cell_in(plane.first + i);
     const MeshPatch::Cell& cell = patch_.cells()[here];
     if (!in_cell(cell, x)) continue;
-    corners.clear();
-    add_corners(here, &corners);
     for (int k = cell.first; k < cell.first + cell.corners; ++k) {
       const MeshPatch::Edge& e = patch_.edges()[patch_.edge_of(k)];
       if (e.inner || e.sides != 2) continue;
       for (int s = e.first_side; s < e.first_side + 2; ++s)
-        if (patch_.side(s).cell != here) add_corners(patch_.side(s).cell, &corners);
+        if (patch_.side(s).cell != here && meets_cell(patch_.side(s).cell)) return false;
     }
-    if (!misses(corners)) return false;
   }
   return true;
 }
 
-void SurfaceSearch::add_corners(int cell, std::vector<Vec3>* corners) const {
-  const MeshPatch::Cell& c = patch_.cells()[cell];
-  for (int k = c.first; k < c.first + c.corners; ++k)
-    corners->push_back(patch_.vertices()[patch_.corner(k)].x);
+// Whether a body whose deepest point is over a face has gone round a border of the wall to there, and has
+// little of the face but what the border meets: the point of the face above the deepest one is not in the
+// body.
+bool SurfaceSearch::reaches_round(int number, const Vec3& deepest, double gap) const {
+  const MeshPatch::Plane& plane = patch_.planes()[number];
+  const Vec3& normal = planes_[number].normal;
+  if (!is_thinner(gap) || !(normal.dot(deepest) < 0)) return false;
+  const Vec3 above = particle_.x + deepest - gap * normal, way = crossing(number, deepest, gap) - above;
+  double last = 0;
+  bool border = false;
+  for (int i = 0; i < plane.edges; ++i) {
+    const MeshPatch::Edge& e = patch_.edges()[patch_.edge_in(plane.first_edge + i)];
+    if (e.inner) continue;
+    const Vec3 to = patch_.vertices()[e.v[0]].x - above, across = e.direction.cross(normal);
+    const double t = to.dot(across) / way.dot(across), along = (t * way - to).dot(e.direction);
+    if (t > last && t < 1 && along >= 0 && along <= e.length) last = t, border = e.sides == 1;
+  }
+  return border && is_clear_of(particle_, &above, 1);
 }
 
-// Whether a direction parts the body from the hull of some corners.
-bool SurfaceSearch::misses(const std::vector<Vec3>& corners) const {
-  return is_clear_of(particle_, corners.data(), static_cast<int>(corners.size()));
+// Whether no direction parts the body from a cell.
+bool SurfaceSearch::meets_cell(int number) const {
+  const MeshPatch::Cell& cell = patch_.cells()[number];
+  std::vector<Vec3>& corners = workspace().corners;
+  corners.clear();
+  for (int k = cell.first; k < cell.first + cell.corners; ++k)
+    corners.push_back(patch_.vertices()[patch_.corner(k)].x);
+  return !is_clear_of(particle_, corners.data(), static_cast<int>(corners.size()));
 }
 
 bool SurfaceSearch::add_plane(int number, int triangle, bool flat, double gap, const Vec3& on_body) {
