@@ -262,7 +262,7 @@ void AtomVecNurbs::init() {
   check_ids();
   if (const std::string bad = check_all_owned(); !bad.empty()) nurbs_host::fail_one(lmp, bad);
   warn_default_density();
-  warn_wider_than_box();
+  check_wider_than_box();
 }
 
 // In the course of a step the host has its ghosts, of one step before, but drops them after an insertion; the
@@ -345,19 +345,27 @@ void AtomVecNurbs::warn_default_density() {
   density_wanted_ = false;
 }
 
-// Once: shape files in millimetres and a deck in metres end in the host's 'Neighbor list overflow'. A long
-// body in a short box may be meant; one whose inner sphere is wider is not.
-void AtomVecNurbs::warn_wider_than_box() {
-  double mine = 0, widest = 0, shortest = domain->boxhi[0] - domain->boxlo[0];
+// Shape files in millimetres and a deck in metres end in the host's 'Neighbor list overflow', or, where a
+// list is written past its end before that, in nothing. A long body in a short box may be meant; one whose
+// inner sphere is wider is not: it is warned of once, and refused where it would overlap its own image.
+void AtomVecNurbs::check_wider_than_box() {
+  double mine = 0, widest = 0;
   for (int i = 0; i < atom->nlocal; ++i) mine = std::max(mine, 2 * scale_[i] * shape(i)->inner_radius);
   MPI_Allreduce(&mine, &widest, 1, MPI_DOUBLE, MPI_MAX, world);
-  for (int k = 1; k < 3; ++k) shortest = std::min(shortest, domain->boxhi[k] - domain->boxlo[k]);
-  if (widest <= shortest || !told_.insert("wider than the box").second) return;
-  nurbs_host::warn(
-      FLERR, lmp,
-      "There are particles of inner diameter " + nurbs_host::show(widest) + " in a box " +
-          nurbs_host::show(shortest) +
-          " wide; are the shape file's lengths the deck's? 'set group all nurbs/scale S' scales them");
+  double shortest = nurbs::kInfinity, period = nurbs::kInfinity;
+  for (int k = 0; k < 3; ++k) {
+    const double edge = domain->boxhi[k] - domain->boxlo[k];
+    shortest = std::min(shortest, edge);
+    if (domain->periodicity[k]) period = std::min(period, edge);
+  }
+  if (widest <= shortest) return;
+  const std::string words = "There are particles of inner diameter " + nurbs_host::show(widest) + " in a " +
+                            (widest > period ? "periodic " : "") + "box " +
+                            nurbs_host::show(widest > period ? period : shortest) +
+                            " wide; are the shape file's lengths the deck's? 'set group all nurbs/scale S' "
+                            "scales them";
+  if (widest > period) nurbs_host::fail_all(FLERR, lmp, words);
+  if (told_.insert("wider than the box").second) nurbs_host::warn(FLERR, lmp, words);
 }
 
 // The host's `set` command treats a particle as a sphere. `set diameter` (of the bounding sphere) means a

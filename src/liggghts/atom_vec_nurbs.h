@@ -168,7 +168,7 @@ class AtomVecNurbs : public AtomVec {
 
   int append_atom(int type, const double* coord, tagint image);
   void warn_default_density();
-  void warn_wider_than_box();
+  void check_wider_than_box();
   std::vector<nurbs::Particle> foreign_bodies(double radius) const;
   void follow_set_command(int i);
   void update_size(int i);

@@ -19,35 +19,43 @@ void LentSphereFlag::give_back(LAMMPS* lmp) const {
   lmp->atom->sphere_flag = own_;
 }
 
-ComputeContactAtomNurbs::ComputeContactAtomNurbs(LAMMPS* lmp, int& iarg, int narg, char** arg)
+template <class HostCompute>
+ComputeContactAtomNurbs<HostCompute>::ComputeContactAtomNurbs(LAMMPS* lmp, int& iarg, int narg, char** arg)
     : LentSphereFlag(lmp),
-      ComputeContactAtom(lmp, iarg, narg, arg),
+      HostCompute(lmp, iarg, narg, arg),
       serves_nurbs_(dynamic_cast<AtomVecNurbs*>(lmp->atom->avec) != nullptr) {
   give_back(lmp);
-  if (serves_nurbs_ && skin != 0)
+  if (serves_nurbs_ && this->skin != 0)
     nurbs_host::fail_all(FLERR, lmp,
                          "Compute contact/atom: skin can't be used with NURBS particles; contacts are exact");
 }
 
-void ComputeContactAtomNurbs::init() {
-  if (!serves_nurbs_) return ComputeContactAtom::init();
-  if (PairGranNurbs::find(lmp) == nullptr)
-    nurbs_host::fail_all(FLERR, lmp, "Compute contact/atom needs pair_style gran/nurbs");
+template <class HostCompute>
+void ComputeContactAtomNurbs<HostCompute>::init() {
+  if (!serves_nurbs_) return HostCompute::init();
+  if (PairGranNurbs::find(this->lmp) == nullptr)
+    nurbs_host::fail_all(FLERR, this->lmp, "Compute contact/atom needs pair_style gran/nurbs");
 }
 
-void ComputeContactAtomNurbs::compute_peratom() {
-  if (!serves_nurbs_) return ComputeContactAtom::compute_peratom();
-  invoked_peratom = update->ntimestep;
-  if (atom->nmax > nmax) {
-    memory->destroy(contact);
-    nmax = atom->nmax;
-    memory->create(contact, nmax, "contact/atom:contact");
-    vector_atom = contact;
+template <class HostCompute>
+void ComputeContactAtomNurbs<HostCompute>::compute_peratom() {
+  if (!serves_nurbs_) return HostCompute::compute_peratom();
+  const Atom& atom = *this->atom;
+  double*& contact = this->contact;
+  this->invoked_peratom = this->update->ntimestep;
+  if (atom.nmax > this->nmax) {
+    this->memory->destroy(contact);
+    this->nmax = atom.nmax;
+    this->memory->create(contact, this->nmax, "contact/atom:contact");
+    this->vector_atom = contact;
   }
-  std::fill_n(contact, nmax, 0.0);
-  PairGranNurbs::find(lmp)->count_contacts(contact);
-  for (int i = 0; i < atom->nlocal; ++i)
-    if (!(atom->mask[i] & groupbit)) contact[i] = 0;
+  std::fill_n(contact, this->nmax, 0.0);
+  PairGranNurbs::find(this->lmp)->count_contacts(contact);
+  for (int i = 0; i < atom.nlocal; ++i)
+    if (!(atom.mask[i] & this->groupbit)) contact[i] = 0;
 }
+
+template class ComputeContactAtomNurbs<ComputeContactAtom>;
+template class ComputeContactAtomNurbs<ComputeContactAtomGran>;
 
 }  // namespace LAMMPS_NS

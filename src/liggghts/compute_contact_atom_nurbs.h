@@ -1,8 +1,9 @@
-// compute contact/atom, as the host's, for NURBS particles: how many particles each one touches. The host's
-// counts overlapping bounding spheres and wants spheres. With another atom style it is the host's compute.
+// compute contact/atom and contact/atom/gran, as the host's, for NURBS particles: how many particles each one
+// touches. The host's counts overlapping bounding spheres and wants spheres. With another atom style it is
+// the host's compute.
 #ifdef COMPUTE_CLASS
 
-ComputeStyle(contact/atom,ComputeContactAtomNurbs)
+ComputeStyle(contact/atom,ComputeContactAtomAny) ComputeStyle(contact/atom/gran,ComputeContactAtomGranAny)
 
 #else
 
@@ -10,6 +11,7 @@ ComputeStyle(contact/atom,ComputeContactAtomNurbs)
 #define LMP_COMPUTE_CONTACT_ATOM_NURBS_H
 
 #include "compute_contact_atom.h"
+#include "compute_contact_atom_gran.h"
 
 namespace LAMMPS_NS {
 
@@ -23,7 +25,8 @@ class LentSphereFlag {
   int own_;
 };
 
-class ComputeContactAtomNurbs : private LentSphereFlag, public ComputeContactAtom {
+template <class HostCompute>
+class ComputeContactAtomNurbs : private LentSphereFlag, public HostCompute {
  public:
   ComputeContactAtomNurbs(LAMMPS* lmp, int& iarg, int narg, char** arg);
 
@@ -33,6 +36,11 @@ class ComputeContactAtomNurbs : private LentSphereFlag, public ComputeContactAto
  private:
   bool serves_nurbs_;
 };
+
+using ComputeContactAtomAny = ComputeContactAtomNurbs<ComputeContactAtom>;
+using ComputeContactAtomGranAny = ComputeContactAtomNurbs<ComputeContactAtomGran>;
+extern template class ComputeContactAtomNurbs<ComputeContactAtom>;
+extern template class ComputeContactAtomNurbs<ComputeContactAtomGran>;
 
 }  // namespace LAMMPS_NS
 

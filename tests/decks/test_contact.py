@@ -299,11 +299,22 @@ dump p all local 100 pgl.dump c_pgl[7] c_pgl[8] c_pgl[10] c_pgl[11] c_pgl[12] c_
         np.testing.assert_allclose(points, np.sort(np.array([row[6:9] for row in ours]), axis=0), atol=1e-6)
 
     def test_features_for_spheres_are_refused(self):
-        for extra, message in (("compute c all contact/atom/gran", "requires atom style sphere"),
+        for extra, message in (("compute c all contact/atom/gran skin 0.1", "skin can't be used"),
                                ("fix 2 all check/timestep/gran 10 0.1 0.1", "gran")):
             run = deck.run(scene(extra=extra, run="run 1"), files=files())
             self.assertNotEqual(run.status, 0, extra)
             self.assertIn(message, "\n".join(run.errors), extra)
+
+    def test_particles_wider_than_a_period_are_refused(self):
+        for boundary, refused in (("f f f", False), ("f p f", True)):
+            text = scene(run="run 0").replace("boundary f f f", "boundary " + boundary)
+            text = text.replace("run 0", "set group all nurbs/scale 100\nrun 0")
+            run = deck.run(text, ranks=2, files=files())
+            lines = [line for line in run.screen.splitlines() if "There are particles of inner diameter" in line]
+            self.assertEqual(len(lines), 1, run.screen)
+            self.assertIn("in a periodic box" if refused else "in a box", lines[0])
+            self.assertIn("ERROR" if refused else "WARNING", lines[0])
+            self.assertTrue(run.status != 0 or not refused)
 
     def test_time_step_too_long_is_warned_of_once_with_the_step_to_use(self):
         law = "kn 1e5 kt 5e4 cn 2000 mu 0.3"

@@ -541,12 +541,13 @@ class HostFeatures(unittest.TestCase):
     def test_computes_of_the_host(self):
         """What other commands show of a contact is what the host's spheres show."""
         commands = ("compute forces all pair/gran/local id force torque\ncompute touching all contact/atom\n"
+                    "compute touching_too all contact/atom/gran\n"
                     "compute stress all stress/atom\ncompute heat all temp\ncompute push all pressure heat\ncompute potential all pe\n"
                     "dump l all local 50 local.dump c_forces[1] c_forces[2] c_forces[4] c_forces[5] c_forces[6] "
                     "c_forces[7] c_forces[8] c_forces[9]\n"
                     'dump_modify l format "%.10g %.10g %.10g %.10g %.10g %.10g %.10g %.10g"\n'
-                    "dump s all custom 50 stress.dump id c_touching c_stress[1] c_stress[2] c_stress[4]\n"
-                    'dump_modify s sort id format "%d %.10g %.10g %.10g %.10g"\n'
+                    "dump s all custom 50 stress.dump id c_touching c_touching_too c_stress[1] c_stress[2] c_stress[4]\n"
+                    'dump_modify s sort id format "%d %.10g %.10g %.10g %.10g %.10g"\n'
                     "thermo_style custom step c_potential c_push c_heat\nthermo 50")
         scene = Scene(PAIR, "hertz tangential history rolling_friction epsd2", steps=100, every=50, commands=commands)
         host, ours = scene.run("sphere"), scene.run("nurbs")
