@@ -399,7 +399,7 @@ double ContactStages::kept_energy(const FlatContact& flat, const PolygonState& s
                                   const ContactPolygon& polygon, const PolygonState& fresh, int a, int b,
                                   const PointMemories& memory, double holds) const {
   double held = energy_of(flat.polygon, state, a, b, point_memories(flat));
-  if (rolled_along(flat.polygon, polygon)) held = energy_rolled(flat, held, polygon, holds, a, b, memory);
+  if (rolled_along(flat.polygon, polygon)) return energy_rolled(flat, held, polygon, holds, a, b, memory);
   if (!(holds > held)) return held;
   const int deepest = static_cast<int>(std::min_element(fresh.gap, fresh.gap + fresh.count) - fresh.gap);
   const Vec3 &arm_a = fresh.arm_a[deepest], &arm_b = fresh.arm_b[deepest];

@@ -747,6 +747,40 @@ TEST(RegionPolygon, where_there_is_none_there_is_none_on_the_clear_way) {
   for (const int count : found) EXPECT_GT(count, 50);  // points, features beside the region, polygons
 }
 
+// A capsule's long line and a tablet's short one: the polygon is the same whichever of the bodies comes
+// first.
+TEST(ContactPolygon, lines_side_by_side_do_not_know_which_body_is_first) {
+  const ShapePointer shapes[] = {make_shape("capsule", capsule(1, 2)), round_rimmed(), roller()};
+  Random random(15);
+  int made = 0;
+  for (int k = 0; k < 600; ++k) {
+    Particle a, b;
+    a.shape = shapes[k % 3].get();
+    b.shape = shapes[(k + 1) % 3].get();
+    a.q = random.turn();
+    b.q = (random.turn_by(random.log_uniform(1e-4, 0.1)) * a.q).normalized();
+    const Vec3 axis = a.q * Vec3::UnitZ(), aside = axis.cross(random.direction()).normalized();
+    b.x = 2.5 * aside + random.uniform(-1, 1) * axis;
+    const double target = -random.log_uniform(1e-4, 1e-2);
+    ContactResult r;
+    for (int i = 0; i < 40; ++i) {
+      double memory[kPairMemorySize] = {0};
+      r = find_contact(a, b, {}, memory);
+      b.x += (target - r.gap) * r.normal;
+    }
+    if (!(std::abs(r.gap - target) < 1e-6) || std::abs(r.normal.dot(axis)) > 0.2) continue;
+    ContactPolygon one, other;
+    make_pair_polygon(a, b, r.normal, -r.gap, -kReach * r.gap, nullptr, &one);
+    make_pair_polygon(b, a, -r.normal, -r.gap, -kReach * r.gap, nullptr, &other);
+    ASSERT_EQ(one.count, other.count) << k;
+    if (one.count == 0) continue;
+    ++made;
+    const double energy = evaluate(one, body_frame(a), body_frame(b)).energy;
+    EXPECT_NEAR(evaluate(other, body_frame(b), body_frame(a)).energy, energy, 1e-9 * energy) << k;
+  }
+  EXPECT_GT(made, 100);
+}
+
 // A fitted prism came down on one edge and went on to the next, shorter one: as a line rolled there, the old
 // points would have held a hundred times their energy, far out on the new edge's line.
 TEST(ContactPolygon, another_edge_is_no_line_that_rolled) {

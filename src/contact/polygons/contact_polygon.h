@@ -130,12 +130,12 @@ RegionContact make_region_polygon(const Particle& particle, const PlaneRegion& r
 // the shallower one is taken (separating axis), within kReferenceShare the one `old` (may be null) had, else
 // A, except that a face lying inside the other is incident. The incident face is clipped by the reference's
 // outline; if its clipped points are not all within reach, a crease, then a ruled line of the incident body,
-// is clipped instead. Without a face, two parallel lines give the segment they share, with A's line in the
-// reference plane, across which the bodies overlap least. Round sides whose lines cross share one while it
-// would lack a hundredth of the overlap at most where they lie beside each other. Crossing edges, and corners
-// on faces, are single points: false, count = 0. 1.5 us for two boxes, 15 to 30 us for discs and rounded
-// boxes, of which support searches from cold starts are the most. `starts`: surface points of A and B near
-// the contact, where searches begin; may be null.
+// is clipped instead. Without a face, two parallel lines give the segment they share, with the longer one in
+// the reference plane (of equal ones A's), across which the bodies overlap least. Round sides whose lines
+// cross share one while it would lack a hundredth of the overlap at most where they lie beside each other.
+// Crossing edges, and corners on faces, are single points: false, count = 0. 1.5 us for two boxes, 15 to 30
+// us for discs and rounded boxes, of which support searches from cold starts are the most. `starts`: surface
+// points of A and B near the contact, where searches begin; may be null.
 bool make_pair_polygon(const Particle& a, const Particle& b, const Vec3& normal, double overlap, double reach,
                        const ContactPolygon* old, ContactPolygon* out, double* clear = nullptr,
                        const SurfacePoint* starts = nullptr);
@@ -177,11 +177,6 @@ double stored_energy(const ContactPolygon& polygon, const PolygonState& state);
 // not much shorter. Another edge of the body is not.
 bool rolled_along(const ContactPolygon& old, const ContactPolygon& polygon);
 
-// `old`, two points, once they have gone to the line where the new polygon of the same bodies lies, each
-// staying where it is along it: both are segments of ruled lines, and rolling costs nothing. `state` is the
-// new one's.
-PolygonState after_rolling(const ContactPolygon& old, const ContactPolygon& polygon,
-                           const PolygonState& state);
 // The factor that gives an energy to a polygon that holds `full` at factor 1; 1 where one of the two is none.
 double continuity_factor(double energy, double full);
 // Gives it that energy by its factor where it holds less, up to `stiffest` (or what it had), and where it

@@ -16,7 +16,8 @@ constexpr double kLineAngle = 0.8;        // rad, the same for the normal of a r
 constexpr double kSameWay = 0.99, kOtherWay = 1.1;
 // Of the deepest place over a face, that a new and an old polygon on it must have at least.
 constexpr double kNewDepth = 0.5, kKeptDepth = 0.25;
-constexpr double kPairShare = 0.5;  // as kWayShare, where the overlap's growth counts by itself
+constexpr double kPairShare = 0.5;    // as kWayShare, where the overlap's growth counts by itself
+constexpr double kSameLength = 1e-6;  // of the bounding radius: lines as long
 constexpr double kBeside = 0.01, kKeptBeside = 0.02;  // of the overlap, that lines beside each other may lack
 constexpr double kMostAcross = 0.1;  // rad: one step of the search for the least overlap across lines
 constexpr int kAcrossSteps = 12;     // of them; 2 to 3 are usual
@@ -393,8 +394,21 @@ struct LinePair {
   double length;  // of A's
   Vec2 p, q;      // ends of B's in the plane, along A's line and sideways
 
-  // Sideways from A's line, at most.
-  double aside() const { return std::max(std::abs(p[1]), std::abs(q[1])); }
+  const Vec2& end(int i) const { return i == 0 ? p : q; }
+  // Where B's line is cut at its end `i`, 0 there, as it reaches past A's; 1 and more if all of it does.
+  double cut(int i) const {
+    const double from = end(i)[0], at = std::clamp(from, 0.0, length);
+    return at == from ? 0 : (at - from) / (end(1 - i)[0] - from);
+  }
+  // Sideways from A's line, at most, where they lie beside each other.
+  double aside() const {
+    double most = 0;
+    for (int i = 0; i < 2; ++i) {
+      const double t = std::clamp(cut(i), 0.0, 1.0);
+      most = std::max(most, std::abs(end(i)[1] + t * (end(1 - i)[1] - end(i)[1])));
+    }
+    return most;
+  }
 };
 
 LinePair pair_of(const Line& a, const Line& b, const Vec3& d) {
@@ -437,25 +451,36 @@ Vec3 least_across(const Body& a, const Body& b, const Vec3& u, const Vec3& d) {
   return along(angle);
 }
 
-// Two parallel lines; ruled ones in the plane across which the bodies overlap least. `room`, where there are
-// none: how far points may go before there may be. `rolls`: they were so before, and the normal has turned
-// with A, not to where the lines have gone.
-bool line_contact(const Body& a, const Body& b, Vec3 d, double overlap, double reach,
-                  const SurfacePoint* starts, bool rolls, ContactPolygon* out, double* room) {
-  // Both bodies need a feature that lags no more than that behind their support.
-  const auto lag = [](const Body& body, const Vec3& along, const SurfacePoint* start) {
-    const Vec3 on_body = body.turned_back(along);
-    const Support top = find_feature_top(*body.shape, on_body, start);
-    return body.frame.scale * feature_lag(*body.shape, on_body, top.h, top.where);
+// Whether both bodies have a feature that lags no more than `reach` behind their support; `room`, where they
+// have none: how far the pair may go before they may. `longest`: of B if the ruled line at its support is
+// longer than A's, else of A.
+bool may_share_line(const Body& a, const Body& b, const Vec3& d, double reach, const SurfacePoint* starts,
+                    double* room, int* longest) {
+  const auto has_lines = [](const Body& body) {
+    return !body.shape->flats.edges.empty() || !body.shape->flats.ruling.empty();
   };
-  const FlatFeatures &flats_a = a.shape->flats, &flats_b = b.shape->flats;
   *room = kInfinity;
-  if ((flats_a.edges.empty() && flats_a.ruling.empty()) || (flats_b.edges.empty() && flats_b.ruling.empty()))
-    return false;
-  *room = lag(a, d, starts ? &starts[0] : nullptr) - reach;
-  if (*room > 0) return false;
-  *room = lag(b, -d, starts ? &starts[1] : nullptr) - reach;
-  if (*room > 0) return false;
+  if (!has_lines(a) || !has_lines(b)) return false;
+  double length[2] = {0, 0};
+  for (const Body* body : {&a, &b}) {
+    const Vec3 on_body = body->turned_back(body->index == 0 ? d : Vec3(-d));
+    const Support top = find_feature_top(*body->shape, on_body, starts ? &starts[body->index] : nullptr);
+    *room = body->frame.scale * feature_lag(*body->shape, on_body, top.h, top.where) - reach;
+    if (*room > 0) return false;
+    RuledLine line;
+    if (!body->shape->flats.ruling.empty() && ruled_line(*body->shape, top.where, on_body, kLineAngle, &line))
+      length[body->index] = body->frame.scale * (line.ends[1] - line.ends[0]).norm();
+  }
+  *longest = length[1] > length[0] + kSameLength * a.radius() ? 1 : 0;
+  return true;
+}
+
+// Two parallel lines; ruled ones in the plane across which the bodies overlap least. A is the reference here:
+// the body with the longer line, whatever its index, for the shorter one is beside it all along. `room`,
+// where there are none: how far points may go before there may be. `rolls`: they were so before, and the
+// normal has turned with A, not to where the lines have gone.
+bool line_contact(const Body& a, const Body& b, Vec3 d, double overlap, double reach, bool rolls,
+                  ContactPolygon* out, double* room) {
   *room = 0;
   const double smaller = std::min(a.radius(), b.radius());
   Line on_a, on_b;
@@ -471,8 +496,6 @@ bool line_contact(const Body& a, const Body& b, Vec3 d, double overlap, double r
     return false;
   const LinePair lines = pair_of(on_a, on_b, d);
   const ReferencePlane& plane = lines.plane;
-  const double length = lines.length;
-  const Vec2 &p = lines.p, &q = lines.q;
   // Lines further apart sideways than this touch at one point. Where they are, round sides overlap by less:
   // s apart by s^2 / 2 (R_A + R_B).
   const double round = radius_across(a, on_a, plane.v) + radius_across(b, on_b, plane.v),
@@ -483,28 +506,24 @@ bool line_contact(const Body& a, const Body& b, Vec3 d, double overlap, double r
     return false;
   }
   Candidates points;
-  bool whole = true;
   for (int i = 0; i < 2; ++i) {
-    const Vec2 &mine = i == 0 ? p : q, &other = i == 0 ? q : p;
-    const double at = std::clamp(mine[0], 0.0, length);
-    const bool cut = at != mine[0];
-    const double t = cut ? (at - mine[0]) / (other[0] - mine[0]) : 0;
+    const double t = lines.cut(i);
     if (!(t >= 0 && t < 1)) return false;
-    whole = whole && !cut;
     const Vec3 x = on_b.ends[i] + t * (on_b.ends[1 - i] - on_b.ends[i]);
     points.add(plane.project(x), b.to_shape(x), plane.height(x),
-               cut ? vertex_id(0, on_a.vertex[at > 0 ? 1 : 0]) : vertex_id(1, on_b.vertex[i]));
+               t > 0 ? vertex_id(a.index, on_a.vertex[lines.end(i)[0] > 0 ? 1 : 0])
+                     : vertex_id(b.index, on_b.vertex[i]));
   }
   if (!points.within(reach - overlap) || !points.bears(overlap) || !finish(points, reach, nullptr, out))
     return false;
-  out->reference = 0;
+  out->reference = a.index;
   out->factor = 1;
   const Vec3 local = a.turned_back(plane.normal);
   store(local, out->normal);
   out->offset = local.dot(a.to_shape(on_a.ends[0]));
   set_marks(a.frame, b.frame, out);
   out->rolling = on_a.ruled || on_b.ruled ? 1 : 0;
-  out->room = kSlideShare * length;
+  out->room = kSlideShare * lines.length;
   return true;
 }
 
@@ -552,8 +571,14 @@ bool make_pair_polygon(const Particle& pa, const Particle& pb, const Vec3& norma
   }
   if (attempt(1 - first, out, &swallowed)) return true;
   double room = 0;
-  const bool rolls = old && old->count == 2 && old->rolling != 0;
-  if (line_contact(a, b, normal, overlap, reach, starts, rolls, out, &room)) return true;
+  int reference = 0;
+  if (may_share_line(a, b, normal, reach, starts, &room, &reference)) {
+    const bool rolls = old && old->count == 2 && old->rolling != 0;
+    if (rolls) reference = old->reference;
+    const bool found = reference == 0 ? line_contact(a, b, normal, overlap, reach, rolls, out, &room)
+                                      : line_contact(b, a, -normal, overlap, reach, rolls, out, &room);
+    if (found) return true;
+  }
   *out = {};
   if (!clear) return false;
   // Other faces may become the nearest ones.
