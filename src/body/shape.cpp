@@ -148,7 +148,11 @@ bool connect_without_needless_knots(Draft& draft) {
   const double own = gap();
   std::swap(draft.cut, simpler);
   split(draft);
-  if (gap() <= std::max(std::isfinite(own) ? 2 * own : 0, kGapOfDigits * tolerance)) return true;
+  // One without gaps stays so: supports cost more where there are any.
+  const double none = 0.25 * kJointRoundoff / kJoinTolerance * tolerance;
+  const double allowed =
+      own <= none ? none : std::max(std::isfinite(own) ? 2 * own : 0, kGapOfDigits * tolerance);
+  if (gap() <= allowed) return true;
   std::swap(draft.cut, simpler);
   split(draft);
   return false;

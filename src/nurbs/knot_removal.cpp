@@ -8,7 +8,7 @@
 namespace nurbs {
 namespace {
 
-constexpr double kKnotRemoval = 8e-15;  // share of the largest coordinate, or weight
+constexpr double kKnotRemoval = 4e-15;  // of the largest coordinate, or weight, times the degree
 constexpr double kJoinedWeights = 10;   // largest over smallest: an arc of 168 degrees
 constexpr double kSliver = 1e-3;        // of both spans: one that is joined even if that takes ...
 constexpr double kSliverWeights = 1e9;  // ... such weights
@@ -121,10 +121,11 @@ NurbsSurface surface_of(const NurbsSurface& s, const std::vector<Span>& spans) {
 NurbsSurface remove_knots_u(const NurbsSurface& s, int* removed) {
   *removed = 0;
   std::vector<Span> spans = spans_of(s);
+  const double digits = s.degree_u * kKnotRemoval;
   Allowed allowed;
   for (const Vec4& p : s.points) {
-    allowed.coordinate = std::max(allowed.coordinate, kKnotRemoval * p.head<3>().cwiseAbs().maxCoeff());
-    allowed.weight = std::max(allowed.weight, kKnotRemoval * p[3]);
+    allowed.coordinate = std::max(allowed.coordinate, digits * p.head<3>().cwiseAbs().maxCoeff());
+    allowed.weight = std::max(allowed.weight, digits * p[3]);
   }
   // Short spans first: what is long is prolonged by little.
   std::vector<char> needed(spans.size(), false);  // the knot at the end of a span
