@@ -135,8 +135,9 @@ std::vector<std::string> describe_proofs(const Shape& shape) {
                            100 * p.unproven_share));
   }
   if (!(p.seen_max > 0) && !p.sphere) {
-    lines.push_back(
-        format("proven: curvature radii from %.4g: all faces are flat, %d cells", radii.min_radius, p.cells));
+    lines.push_back(format(p.convex ? "proven: curvature radii from %.4g: all faces are flat, %d cells"
+                                    : "proven: curvature radii from %.4g, %d cells",
+                           radii.min_radius, p.cells));
   } else {
     lines.push_back(format("proven: curvature radii from %.4g to %.4g (%.4g to %.4g occur), %d cells",
                            radii.min_radius, radii.max_radius, p.sphere ? radii.min_radius : p.seen_min,
