@@ -168,10 +168,9 @@ void SurfaceSearch::touch_vertex(int number) {
   int weight = 1;
   for (int i = 0; i < v.edges; ++i) {
     const int e = patch_.edge_at(v.first_edge + i);
-    if (climbs(e, number, f.normal)) weight -= 1 - patch_.edges()[e].sides;
+    if (!patch_.edges()[e].inner && climbs(e, number, f.normal)) weight -= 1 - patch_.edges()[e].sides;
   }
-  for (int i = 0; i < v.cells; ++i)
-    if (cell_climbs(patch_.cell_at(v.first_cell + i), number, f.normal)) --weight;
+  weight -= climbing_faces(number, f.normal);
   if (weight == 0) return;
   add_vertex(f, weight, v, SurfaceContact::vertex);
 }
@@ -226,14 +225,43 @@ bool SurfaceSearch::climbs(int edge, int vertex, const Vec3& d) const {
   }
 }
 
-bool SurfaceSearch::cell_climbs(int number, int vertex, const Vec3& d) const {
-  const MeshPatch::Cell& cell = patch_.cells()[number];
-  for (int k = 0; k < cell.corners; ++k) {
-    if (patch_.corner(cell.first + k) != vertex) continue;
-    const int before = patch_.edge_of(cell.first + (k + cell.corners - 1) % cell.corners);
-    return climbs(patch_.edge_of(cell.first + k), vertex, d) || climbs(before, vertex, d);
+// How many of the faces at a vertex climb along d from it: at one of their edges there. Cells that a cut
+// within a plane parts are one face, and whether the cut climbs says nothing: where the body met the edges
+// says more than d, which the cut has nothing else to go by.
+int SurfaceSearch::climbing_faces(int number, const Vec3& d) {
+  const MeshPatch::Vertex& v = patch_.vertices()[number];
+  std::vector<FaceAtVertex>& faces = workspace().faces;
+  faces.clear();
+  for (int i = 0; i < v.cells; ++i) {
+    const MeshPatch::Cell& cell = patch_.cells()[patch_.cell_at(v.first_cell + i)];
+    for (int k = 0; k < cell.corners; ++k) {
+      if (patch_.corner(cell.first + k) != number) continue;
+      FaceAtVertex face{{patch_.edge_of(cell.first + (k + cell.corners - 1) % cell.corners),
+                         patch_.edge_of(cell.first + k)},
+                        false};
+      for (int& edge : face.edges) {
+        face.climbs = face.climbs || (!patch_.edges()[edge].inner && climbs(edge, number, d));
+        if (!patch_.edges()[edge].inner) edge = -1;  // it parts faces
+      }
+      faces.push_back(face);
+      break;
+    }
   }
-  return false;
+  // Join those that a cut parts, until none is left.
+  for (std::size_t i = 0; i < faces.size(); ++i)
+    for (std::size_t j = i + 1; j < faces.size(); ++j)
+      for (int side = 0; side < 2; ++side) {
+        FaceAtVertex &one = faces[i], &other = faces[j];
+        const int cut = one.edges[side];
+        if (cut < 0 || (other.edges[0] != cut && other.edges[1] != cut)) continue;
+        one.edges[side] = other.edges[other.edges[0] == cut ? 1 : 0];
+        one.climbs = one.climbs || other.climbs;
+        faces.erase(faces.begin() + static_cast<long>(j));
+        j = i;  // others may follow at the new side
+        break;
+      }
+  return static_cast<int>(
+      std::count_if(faces.begin(), faces.end(), [](const FaceAtVertex& s) { return s.climbs; }));
 }
 
 int SurfaceSearch::add_edge(const FeatureContact& f, int weight, const MeshPatch::Edge& e,

@@ -291,7 +291,9 @@ void SurfaceSearch::touch_outer_edge(int number, const Arc& arc, bool active) {
   int owner = -1;
   for (const Stretch& piece : line) {
     const bool same_way = patch_.edges()[piece.edge].direction.dot(e.direction) > 0;
-    edges_[piece.edge].state = (f.along < piece.from) == same_way ? MetEdge::before : MetEdge::beyond;
+    edges_[piece.edge].state = f.along >= piece.from && f.along <= piece.to ? MetEdge::along
+                               : (f.along < piece.from) == same_way         ? MetEdge::before
+                                                                            : MetEdge::beyond;
     if (f.along > low && f.along < high && f.along >= piece.from && f.along <= piece.to &&
         (owner < 0 || piece.edge < owner))
       owner = piece.edge;

@@ -52,12 +52,19 @@ struct Stretch {
   double from, to;
 };
 
+// What a face has at a vertex: its two edges there, -1 for those that part it from another face.
+struct FaceAtVertex {
+  int edges[2];
+  bool climbs;
+};
+
 // Room that is used again by every search of a thread.
 struct Workspace {
   std::vector<ActivePlane> planes;
   std::vector<MetEdge> edges;
   std::vector<int> active;
   std::vector<Stretch> line;
+  std::vector<FaceAtVertex> faces;
   std::vector<Vec3> corners, ways;  // of a cell; that lead away from a vertex
 };
 Workspace& workspace();
@@ -135,7 +142,7 @@ class SurfaceSearch {
   const ActivePlane* plane_over(const MeshPatch::Vertex& v) const;
   MetEdge::State state(int edge) const;
   bool climbs(int edge, int vertex, const Vec3& d) const;
-  bool cell_climbs(int number, int vertex, const Vec3& d) const;
+  int climbing_faces(int number, const Vec3& d);
   int add_edge(const FeatureContact& f, int weight, const MeshPatch::Edge& e, SurfaceContact::Piece piece);
   int add_vertex(const FeatureContact& f, int weight, const MeshPatch::Vertex& v,
                  SurfaceContact::Piece piece);
