@@ -93,6 +93,10 @@ std::string edge_name(const Draft& draft, int patch, int edge) {
   return name + " (" + (edge < 2 ? "v=" : "u=") + number(from) + ".." + number(to) + ")";
 }
 
+size_t most_patches(size_t uncut) {
+  return kMostCutOfOne * uncut + kMostCut;
+}
+
 // Inserts knots where corners of other patches lie inside edges that nothing matches. A knot runs across its
 // surface, and may end inside an edge of the next: false once there is no such place.
 bool cut_at_t_junctions(Draft& draft, double tolerance) {
@@ -108,14 +112,11 @@ bool cut_at_t_junctions(Draft& draft, double tolerance) {
     const auto is_same = [&](double knot) {
       return knot > from && knot < to && std::abs(knot - at) <= kSameCut * (to - from);
     };
-    if (std::any_of(knots.begin(), knots.end(), is_same)) continue;
+    // (Large knots close to each other may leave no room.)
+    if (!(at > from && at < to) || std::any_of(knots.begin(), knots.end(), is_same)) continue;
     surface = in_v ? swap_uv(insert_knot_u(swap_uv(surface), at)) : insert_knot_u(surface, at);
   }
   return !cuts.empty();
-}
-
-double join_tolerance(const Shape& s) {
-  return kJoinTolerance * diagonal(s.patches);
 }
 
 // No two sides of a joint, and no points of a pole, are further apart.
@@ -129,9 +130,23 @@ double widest_gap(const Shape& s) {
   return widest;
 }
 
-// Cuts the surfaces at as few of their knots as they can do with; false, and nothing changes, if they need
-// all or the rest of them does not close the body as well.
-bool connect_without_needless_knots(Draft& draft) {
+// Joins the patches, cut where corners meet edges at such as these take. What is left over, if any.
+UnmatchedEdge join_patches(Draft& draft, double tolerance) {
+  Shape& s = draft.shape;
+  UnmatchedEdge left = connect_patches(s.patches, tolerance, s.links);
+  const size_t most = most_patches(s.patches.size());
+  for (size_t before = 0; left.patch >= 0 && s.patches.size() != before && s.patches.size() <= most;) {
+    before = s.patches.size();
+    if (!cut_at_t_junctions(draft, tolerance)) break;
+    split(draft);
+    left = connect_patches(s.patches, tolerance, s.links);
+  }
+  return left;
+}
+
+// Joins the surfaces cut at as few of their knots as they can do with; false, and nothing changes, if they
+// need all, or are no fewer patches, or do not close the body as well as those it has, whose gaps are `own`.
+bool join_without_needless_knots(Draft& draft, double tolerance, double own) {
   std::vector<NurbsSurface> simpler;
   int removed = 0;
   for (const NurbsSurface& surface : draft.shape.surfaces) {
@@ -140,51 +155,52 @@ bool connect_without_needless_knots(Draft& draft) {
     removed += in_u + in_v;
   }
   if (removed == 0) return false;
-  const double tolerance = join_tolerance(draft.shape);
-  const auto gap = [&] {
-    const bool closed = connect_patches(draft.shape.patches, tolerance, draft.shape.links).patch < 0;
-    return closed ? widest_gap(draft.shape) : kInfinity;
-  };
-  const double own = gap();
-  std::swap(draft.cut, simpler);
-  split(draft);
   // One without gaps stays so: supports cost more where there are any.
   const double none = 0.25 * kJointRoundoff / kJoinTolerance * tolerance;
   const double allowed =
       own <= none ? none : std::max(std::isfinite(own) ? 2 * own : 0, kGapOfDigits * tolerance);
-  if (gap() <= allowed) return true;
+  const size_t patches = draft.shape.patches.size();
+  std::swap(draft.cut, simpler);
+  split(draft);
+  if (join_patches(draft, tolerance).patch < 0 && widest_gap(draft.shape) <= allowed &&
+      (draft.shape.patches.size() < patches || std::isinf(own)))
+    return true;
   std::swap(draft.cut, simpler);
   split(draft);
   return false;
 }
 
-// Joins the surfaces cut at their own knots, and where corners meet edges at such as these take.
-void connect_cut_at_knots(Draft& draft) {
-  Shape& s = draft.shape;
-  const double tolerance = join_tolerance(s);
-  UnmatchedEdge left = connect_patches(s.patches, tolerance, s.links);
-  if (left.patch < 0) return;
-  std::string message = edge_name(draft, left.patch, left.edge) + " has no partner: the surface is open";
-  if (left.nearest_patch >= 0) {
-    message += ", the nearest free edge is " + edge_name(draft, left.nearest_patch, left.nearest_edge) +
-               ", " + number(left.gap) + " away (allowed " + number(tolerance) + ")";
-  }
-  const size_t most = kMostCutOfOne * s.patches.size() + kMostCut;
-  while (left.patch >= 0 && s.patches.size() <= most && cut_at_t_junctions(draft, tolerance)) {
-    split(draft);
-    left = connect_patches(s.patches, tolerance, s.links);
-  }
-  if (left.patch >= 0) throw ShapeError(message);
-}
-
 void connect(Draft& draft) {
-  const double size = diagonal(draft.shape.patches);
+  Shape& s = draft.shape;
+  const double size = diagonal(s.patches);
   if (!(size > 0)) throw ShapeError("all control points coincide");
   if (!(size >= kLeastSize && size <= kMostSize)) {
     throw ShapeError("the control points' box has a diagonal of " + number(size) + ", must be " +
                      number(kLeastSize) + ".." + number(kMostSize));
   }
-  if (!connect_without_needless_knots(draft)) connect_cut_at_knots(draft);
+  const double tolerance = kJoinTolerance * size;
+  UnmatchedEdge left = connect_patches(s.patches, tolerance, s.links);
+  const bool closed = left.patch < 0;
+  if (join_without_needless_knots(draft, tolerance, closed ? widest_gap(s) : kInfinity)) return;
+  std::string message;
+  if (!closed) {
+    message = edge_name(draft, left.patch, left.edge) + " has no partner: the surface is open";
+    if (left.nearest_patch >= 0 && left.gap <= tolerance) {
+      message = edge_name(draft, left.patch, left.edge) + " has no partner: it lies along " +
+                edge_name(draft, left.nearest_patch, left.nearest_edge) +
+                ", which ends elsewhere and can't be cut there";
+    } else if (left.nearest_patch >= 0) {
+      message += ", the nearest free edge is " + edge_name(draft, left.nearest_patch, left.nearest_edge) +
+                 ", " + number(left.gap) + " away (allowed " + number(tolerance) + ")";
+    }
+  }
+  const size_t most = most_patches(s.patches.size());
+  left = join_patches(draft, tolerance);
+  if (left.patch < 0) return;
+  if (s.patches.size() > most)
+    message = "the patches are cut otherwise at either side of joints; cut alike they would be more than " +
+              std::to_string(most);
+  throw ShapeError(message);
 }
 
 // One closed body: consistent sides everywhere, and connected.
@@ -215,7 +231,7 @@ void turn_surfaces(Draft& draft, const std::vector<bool>& turn) {
     draft.turned[i] = !draft.turned[i];
   }
   split(draft);
-  connect_cut_at_knots(draft);
+  join_patches(draft, kJoinTolerance * diagonal(draft.shape.patches));
 }
 
 void warn_of_turned(Draft& draft) {

@@ -8,7 +8,7 @@
 namespace nurbs {
 namespace {
 
-constexpr double kKnotRemoval = 4e-15;  // of the largest coordinate, or weight, times the degree
+constexpr double kKnotRemoval = 1e-14;  // of the largest coordinate, and of weights, times the degree
 constexpr double kJoinedWeights = 10;   // largest over smallest: an arc of 168 degrees
 constexpr double kSliver = 1e-3;        // of both spans: one that is joined even if that takes ...
 constexpr double kSliverWeights = 1e9;  // ... such weights
@@ -43,26 +43,30 @@ Eigen::MatrixXd cut_at(int degree, double share) {
   return map;
 }
 
-struct Allowed {
-  double coordinate = 0, weight = 0;
+struct Weights {
+  double least = std::numeric_limits<double>::infinity(), most = 0;
+  // Infinite if one is not positive.
+  double spread() const { return least > 0 ? most / least : std::numeric_limits<double>::infinity(); }
 };
-
-// Largest over smallest weight, infinite if one is not positive.
-double spread_of_weights(const std::vector<Points>& curves) {
-  double least = curves[0][0][3], most = least;
+Weights weights_of(const std::vector<Points>& curves) {
+  Weights w;
   for (const Points& curve : curves)
-    for (const Vec4& p : curve) least = std::min(least, p[3]), most = std::max(most, p[3]);
-  return least > 0 ? most / least : std::numeric_limits<double>::infinity();
+    for (const Vec4& p : curve) w.least = std::min(w.least, p[3]), w.most = std::max(w.most, p[3]);
+  return w;
 }
 
 // Both spans as one in `out`, if they are one polynomial: its ends are theirs, the points between those whose
-// parts come closest to the spans.
-bool join(const Span& left, const Span& right, const Allowed& allowed, Span& out) {
+// parts come closest to the spans. `reach`: of the largest coordinate. What a part's point is off, over its
+// weight, bounds what the surface is.
+bool join(const Span& left, const Span& right, double reach, Span& out) {
   const int degree = static_cast<int>(left.curves[0].size()) - 1, inner = degree - 1;
-  const double length = left.length() + right.length();
+  const double length = left.length() + right.length(), digits = degree * kKnotRemoval;
   const Eigen::MatrixXd map = cut_at(degree, left.length() / length);
+  const Weights of_left = weights_of(left.curves), of_right = weights_of(right.curves);
+  const bool even =
+      std::max(of_left.most, of_right.most) <= kJoinedWeights * std::min(of_left.least, of_right.least);
   Eigen::ColPivHouseholderQR<Eigen::MatrixXd> solver;
-  if (inner > 0) solver.compute(map.middleCols(1, inner));
+  if (inner > 0 && even) solver.compute(map.middleCols(1, inner));
   out = {left.from, right.to, left.curves};
   for (size_t k = 0; k < left.curves.size(); ++k) {
     const Points &before = left.curves[k], &after = right.curves[k];
@@ -74,19 +78,25 @@ bool join(const Span& left, const Span& right, const Allowed& allowed, Span& out
     whole.row(0) = before.front();
     whole.row(degree) = after.back();
     if (inner > 0) {
-      const Eigen::MatrixX4d ends = map.col(0) * whole.row(0) + map.col(degree) * whole.row(degree);
-      whole.middleRows(1, inner) = solver.solve(parts - ends);
+      const Eigen::MatrixX4d rest = parts - map.col(0) * whole.row(0) - map.col(degree) * whole.row(degree);
+      if (even) {
+        whole.middleRows(1, inner) = solver.solve(rest);
+      } else {
+        const auto shares = parts.col(3).cwiseInverse().asDiagonal();
+        whole.middleRows(1, inner) =
+            (shares * map.middleCols(1, inner)).colPivHouseholderQr().solve(shares * rest);
+      }
     }
     const Eigen::MatrixX4d off = (map * whole - parts).cwiseAbs();
-    if (!(off.leftCols<3>().maxCoeff() <= allowed.coordinate && off.col(3).maxCoeff() <= allowed.weight))
-      return false;
+    for (int i = 0; i < off.rows(); ++i)
+      if (!(off.row(i).head<3>().maxCoeff() <= digits * reach * parts(i, 3) &&
+            off(i, 3) <= digits * parts(i, 3)))
+        return false;
     for (int i = 0; i <= degree; ++i) out.curves[k][i] = whole.row(i);
   }
   const bool sliver = std::min(left.length(), right.length()) <= kSliver * length;
-  const double most =
-      sliver ? kSliverWeights
-             : std::max({kJoinedWeights, spread_of_weights(left.curves), spread_of_weights(right.curves)});
-  return spread_of_weights(out.curves) <= most;
+  return weights_of(out.curves).spread() <=
+         (sliver ? kSliverWeights : std::max({kJoinedWeights, of_left.spread(), of_right.spread()}));
 }
 
 std::vector<Span> spans_of(const NurbsSurface& s) {
@@ -121,12 +131,8 @@ NurbsSurface surface_of(const NurbsSurface& s, const std::vector<Span>& spans) {
 NurbsSurface remove_knots_u(const NurbsSurface& s, int* removed) {
   *removed = 0;
   std::vector<Span> spans = spans_of(s);
-  const double digits = s.degree_u * kKnotRemoval;
-  Allowed allowed;
-  for (const Vec4& p : s.points) {
-    allowed.coordinate = std::max(allowed.coordinate, digits * p.head<3>().cwiseAbs().maxCoeff());
-    allowed.weight = std::max(allowed.weight, digits * p[3]);
-  }
+  double reach = 0;
+  for (const Vec4& p : s.points) reach = std::max(reach, p.head<3>().cwiseAbs().maxCoeff() / p[3]);
   // Short spans first: what is long is prolonged by little.
   std::vector<char> needed(spans.size(), false);  // the knot at the end of a span
   for (;;) {
@@ -138,7 +144,7 @@ NurbsSurface remove_knots_u(const NurbsSurface& s, int* removed) {
     }
     if (next == spans.size()) break;
     Span both;
-    needed[next] = !join(spans[next], spans[next + 1], allowed, both);
+    needed[next] = !join(spans[next], spans[next + 1], reach, both);
     if (needed[next]) continue;
     spans[next] = std::move(both);
     spans.erase(spans.begin() + static_cast<long>(next) + 1);

@@ -236,6 +236,29 @@ TEST(KnotRemoval, KeepsArcsShort) {
   EXPECT_EQ(removed, 0);
 }
 
+// Two spans that meet at a corner, of weights that grow from 1 to 1e14 in the second: beside those the corner
+// is round-off in homogeneous coordinates.
+TEST(KnotRemoval, KeepsCornersBesideLargeWeights) {
+  for (double turn : {1.5, 1e-3, 1e-5, 1e-8})
+    for (double ratio : {1.0, 1e3, 1e7}) {
+      NurbsSurface s = bezier_surface(2, 1, {});
+      s.knots_u = {0, 0, 0, 1, 1, 2, 2, 2};
+      s.size_u = 5;
+      const Vec2 places[] = {{0, 0},
+                             {0.5, 0},
+                             {1, 0},
+                             {1 + 0.5 * std::cos(turn), 0.5 * std::sin(turn)},
+                             {1 + std::cos(turn), std::sin(turn)}};
+      for (int i = 0; i < 5; ++i) {
+        const double w = std::pow(ratio, std::max(0, i - 2));
+        for (double z : {0, 1}) s.points.emplace_back(w * places[i][0], w * places[i][1], w * z, w);
+      }
+      int removed = 0;
+      remove_knots_u(s, &removed);
+      EXPECT_EQ(removed, 0) << turn << " " << ratio;
+    }
+}
+
 TEST(NurbsSurface, SwapExchangesTheParameters) {
   Random random(7);
   const NurbsSurface s = random_surface(random, 2, 5, false, true), t = swap_uv(s);

@@ -422,6 +422,44 @@ TEST(Connectivity, NeedlessKnotsAreRemoved) {
   }
 }
 
+// ... nor where every face was refined elsewhere; one knot that round-off keeps does not bring all of them
+// back.
+TEST(Connectivity, NeedlessKnotsOfEveryFaceAreRemoved) {
+  Random random(12);
+  for (const Surfaces& whole : bodies_to_cut())
+    for (int degrees : {0, 4}) {
+      Surfaces body = whole;
+      for (NurbsSurface& s : body) {
+        if (s.size_u > s.degree_u + 1 || s.size_v > s.degree_v + 1)
+          continue;  // elevated() takes Bezier patches
+        for (int k = 0; k < degrees; ++k) s = elevated(s);
+      }
+      const size_t patches = build(body)->patches.size();
+      for (NurbsSurface& s : body)
+        for (int k = 0; k < 10; ++k) {
+          const double from = s.knots_u[s.degree_u], length = s.knots_u[s.size_u] - from;
+          s = swap_uv(insert_knot_u(s, from + length * random.uniform(0.02, 0.98)));
+        }
+      ASSERT_EQ(error_of(body), "accepted");
+      EXPECT_LE(build(body)->patches.size(), 10 * patches);  // some 700 a face without
+    }
+}
+
+// Knots so large that there is none between two of them: cutting ends, and what can't be cut is refused.
+TEST(Connectivity, LargeKnotsEndCutting) {
+  for (double large : {1e3, 1e11, 1e13, 1e15}) {
+    Surfaces body = box({1, 2, 3});
+    body.push_back(part_in_u(body[0], 0.37, 1));
+    body[0] = part_in_u(body[0], 0, 0.37);
+    for (size_t k = 1; k + 1 < body.size(); ++k) {
+      for (double& knot : body[k].knots_u) knot += large;
+      for (double& knot : body[k].knots_v) knot += large;
+    }
+    const std::string error = error_of(body);
+    EXPECT_TRUE(large < 1e4 ? error == "accepted" : contains(error, "can't be cut there")) << error;
+  }
+}
+
 // Knots on one side of a joint only, and faces in parts that end inside others' edges: both sides are cut.
 TEST(Connectivity, TJunctionsAreCut) {
   Random random(10);
