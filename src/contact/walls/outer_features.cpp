@@ -214,7 +214,8 @@ bool SurfaceSearch::meets(const std::vector<Stretch>& line, const MeshPatch::Edg
 }
 
 // Whether the body comes to its deepest point at a line through a face of it, and not beside that: on the
-// wall's other side the line may be a valley's, that the body has next to nothing of.
+// wall's other side the line may be a valley's, that the body has next to nothing of. Asked of bodies deeper
+// there than a ball inside them is thick; what is less deep is near the line.
 bool SurfaceSearch::enters(const FeatureContact& f, const std::vector<Stretch>& line,
                            const MeshPatch::Edge& e, const Arc& arc) {
   if (e.sides == 1 || !is_thinner(f.gap)) return true;
