@@ -145,8 +145,8 @@ UnmatchedEdge join_patches(Draft& draft, double tolerance) {
 }
 
 // Joins the surfaces cut at as few of their knots as they can do with; false, and nothing changes, if they
-// need all, or are no fewer patches, or do not close the body as well as those it has, whose gaps are `own`.
-bool join_without_needless_knots(Draft& draft, double tolerance, double own) {
+// need all, or are no fewer patches, or do not close the body as well as those it has, if they do (`closed`).
+bool join_without_needless_knots(Draft& draft, double tolerance, bool closed) {
   std::vector<NurbsSurface> simpler;
   int removed = 0;
   for (const NurbsSurface& surface : draft.shape.surfaces) {
@@ -156,17 +156,18 @@ bool join_without_needless_knots(Draft& draft, double tolerance, double own) {
   }
   if (removed == 0) return false;
   // One without gaps stays so: supports cost more where there are any.
+  const double own = closed ? widest_gap(draft.shape) : 0;
   const double none = 0.25 * kJointRoundoff / kJoinTolerance * tolerance;
-  const double allowed =
-      own <= none ? none : std::max(std::isfinite(own) ? 2 * own : 0, kGapOfDigits * tolerance);
+  const double allowed = closed && own <= none ? none : std::max(2 * own, kGapOfDigits * tolerance);
   const size_t patches = draft.shape.patches.size();
   std::swap(draft.cut, simpler);
   split(draft);
   if (join_patches(draft, tolerance).patch < 0 && widest_gap(draft.shape) <= allowed &&
-      (draft.shape.patches.size() < patches || std::isinf(own)))
+      (draft.shape.patches.size() < patches || !closed))
     return true;
   std::swap(draft.cut, simpler);
   split(draft);
+  connect_patches(draft.shape.patches, tolerance, draft.shape.links);
   return false;
 }
 
@@ -181,18 +182,15 @@ void connect(Draft& draft) {
   const double tolerance = kJoinTolerance * size;
   UnmatchedEdge left = connect_patches(s.patches, tolerance, s.links);
   const bool closed = left.patch < 0;
-  if (join_without_needless_knots(draft, tolerance, closed ? widest_gap(s) : kInfinity)) return;
-  std::string message;
-  if (!closed) {
-    message = edge_name(draft, left.patch, left.edge) + " has no partner: the surface is open";
-    if (left.nearest_patch >= 0 && left.gap <= tolerance) {
-      message = edge_name(draft, left.patch, left.edge) + " has no partner: it lies along " +
-                edge_name(draft, left.nearest_patch, left.nearest_edge) +
-                ", which ends elsewhere and can't be cut there";
-    } else if (left.nearest_patch >= 0) {
-      message += ", the nearest free edge is " + edge_name(draft, left.nearest_patch, left.nearest_edge) +
-                 ", " + number(left.gap) + " away (allowed " + number(tolerance) + ")";
-    }
+  if (join_without_needless_knots(draft, tolerance, closed) || closed) return;
+  std::string message = edge_name(draft, left.patch, left.edge) + " has no partner: the surface is open";
+  if (left.nearest_patch >= 0 && left.gap <= tolerance) {
+    message = edge_name(draft, left.patch, left.edge) + " has no partner: it lies along " +
+              edge_name(draft, left.nearest_patch, left.nearest_edge) +
+              ", which ends elsewhere and can't be cut there";
+  } else if (left.nearest_patch >= 0) {
+    message += ", the nearest free edge is " + edge_name(draft, left.nearest_patch, left.nearest_edge) +
+               ", " + number(left.gap) + " away (allowed " + number(tolerance) + ")";
   }
   const size_t most = most_patches(s.patches.size());
   left = join_patches(draft, tolerance);
