@@ -326,8 +326,9 @@ class ContactStages {
   struct Holding;
   double unit_energy(std::int32_t number, int body, const ContactGeometry& geometry);
   double overlap_of(std::int32_t number, int body, ContactGeometry geometry, double energy);
-  double polygon_energy(std::int32_t number, int body, double shift);
+  double polygon_energy(std::int32_t number, int body, double shift, double ago = 0);
   double leaving_energy(std::int32_t number, int body);
+  double half_way(std::int32_t number, const Vec3& normal) const;
   bool same_piece(std::int32_t number, int body, const WallContact& found) const;
   bool jumps(std::int32_t number, int body, const WallContact& found) const;
   PolygonState polygon_state(const ContactPolygon& polygon, int b, const Vec3& wall, int a) const;
@@ -356,7 +357,7 @@ class ContactStages {
   void forget_flat(ContactBlock& block, int lane);
   bool serve_flat(ContactBlock& block, int lane, LeftPolygon* left);
   bool remake(ContactBlock& block, int lane, FlatContact& flat, PolygonState& state, double overlap);
-  BodyFrame frame_before(int i, const Vec3& wall) const;
+  BodyFrame frame_before(int i, const Vec3& wall, double ago = 1) const;
   double energy_rolled(const FlatContact& flat, double energy, const ContactPolygon& polygon, double holds,
                        int a, int b, const PointMemories& memory) const;
   double kept_energy(const FlatContact& flat, const PolygonState& state, const ContactPolygon& polygon,

@@ -368,12 +368,12 @@ double ContactStages::arrival(int a, int b, const Vec3& normal, const Vec3& arm_
   return kArrival * step_.dt * std::max(0.0, -normal.dot(velocity));
 }
 
-// Where a body, or the wall, was a step ago.
-BodyFrame ContactStages::frame_before(int i, const Vec3& wall) const {
+// Where a body, or the wall, was a step ago, or another share of it.
+BodyFrame ContactStages::frame_before(int i, const Vec3& wall, double ago) const {
   BodyFrame f = placed(*step_.bodies, wall, i);
   const BodyRecord& r = record(i);
-  f.x -= step_.dt * load(r.velocity);
-  const Vec3 turn = -0.5 * step_.dt * (load(r.spin) + load(r.spin_before));
+  f.x -= ago * step_.dt * load(r.velocity);
+  const Vec3 turn = -0.5 * ago * step_.dt * (load(r.spin) + load(r.spin_before));
   const double angle = turn.norm();
   if (angle > 0) f.axes = Eigen::AngleAxisd(angle, turn / angle).toRotationMatrix() * f.axes;
   return f;

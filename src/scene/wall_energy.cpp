@@ -2,7 +2,9 @@
 // of a body with flat faces or sharp corners such contacts come and go at finite overlap: a corner leaves the
 // prism over one triangle, a face comes to stand on a plane that its edge was on. Here the potentials are
 // fitted together, so that the sum over a body's contacts is continuous in its pose:
-//  - What the contacts that end would have held in this pose is shared by those that begin.
+//  - What the contacts that end hold is shared by those that begin. They do it in the middle of the step, as
+//    half of its work is of the old force and half of the new one: that the energy is passed on in the new
+//    pose would leave an error of first order in the step, of the difference of the forces.
 //  - One that begins with less than its overlap makes has the wall *stand back* from it by a shift, in which
 //    nothing is felt: it is as stiff as any other, and it gives back what it took. The shift goes when the
 //    body comes out of it, and slowly under a body at rest.
@@ -47,26 +49,32 @@ double ContactStages::overlap_of(std::int32_t number, int body, ContactGeometry 
   });
 }
 
-// Of a polygon's points in this pose, with the wall `shift` further back.
-double ContactStages::polygon_energy(std::int32_t number, int body, double shift) {
+// Of a polygon's points in this pose, or that of a share of a step `ago`, with the wall `shift` further back.
+double ContactStages::polygon_energy(std::int32_t number, int body, double shift, double ago) {
   FlatContact& flat = *pool_.flat(number);
   ContactPolygon polygon = flat.polygon;
   polygon.offset -= shift;
-  const PolygonState state = polygon_state(polygon, body, wall_frame(-1 - number), -1 - number);
+  const Vec3 wall = wall_frame(-1 - number);
+  const PolygonState state = ago > 0 ? evaluate(polygon, plane_frame(wall), frame_before(body, wall, ago))
+                                     : polygon_state(polygon, body, wall, -1 - number);
   const ContactBlock& block = pool_.block(number);
   if (step_.model == nullptr)
     return step_.laws[block.law[ContactPool::lane(number)]].kn * stored_energy(polygon, state);
   return model_energy(polygon, state, -1 - number, body, point_memories(flat).data());
 }
 
-// What a contact that ends would hold in this pose.
+// By how much the wall moves along a contact's normal in half a step.
+double ContactStages::half_way(std::int32_t number, const Vec3& normal) const {
+  return 0.5 * step_.dt * normal.dot(load(partner(number).record.velocity));
+}
+
+// What a contact that ends holds in the middle of the step.
 double ContactStages::leaving_energy(std::int32_t number, int body) {
   const ContactBlock& block = pool_.block(number);
   const int lane = ContactPool::lane(number);
   const BodyRecord &wall = partner(number).record, &b = record(body);
   if (const FlatContact* flat = pool_.flat(number)) {
-    const Vec3 normal = load(flat->polygon.normal);
-    return polygon_energy(number, body, -step_.dt * normal.dot(load(wall.velocity)));
+    return polygon_energy(number, body, -half_way(number, load(flat->polygon.normal)), 0.5);
   }
   ContactState state;
   block.get(lane, kStateField, kContactStateSize, &state);
@@ -74,7 +82,8 @@ double ContactStages::leaving_energy(std::int32_t number, int body) {
   const Vec3 normal = load(state.normal), arm_a = load(state.arm_a), arm_b = load(state.arm_b);
   const Vec3 velocity =
       load(b.velocity) + load(b.spin).cross(arm_b) - load(wall.velocity) - load(wall.spin).cross(arm_a);
-  const double overlap = state.overlap - step_.dt * normal.dot(velocity), weight = block.field[kWeight][lane];
+  const double overlap = state.overlap - 0.5 * step_.dt * normal.dot(velocity),
+               weight = block.field[kWeight][lane];
   return weight * unit_energy(number, body, {overlap, normal, arm_a, arm_b});
 }
 
@@ -124,10 +133,11 @@ void ContactStages::hold(Holding* h, int body, double energy) {
       flat->polygon.factor *= energy / h->energy;
       return;
     }
+    const double moved = half_way(h->number, load(flat->polygon.normal));
     double low = 0, high = h->geometry.overlap;
     for (int k = 0; k < 60; ++k) {
       const double middle = 0.5 * (low + high);
-      (polygon_energy(h->number, body, middle) > energy ? low : high) = middle;
+      (polygon_energy(h->number, body, middle + moved, 0.5) > energy ? low : high) = middle;
     }
     p.shift += high;
     return;
@@ -135,7 +145,10 @@ void ContactStages::hold(Holding* h, int body, double energy) {
   double& weight = block.field[kWeight][lane];
   const double before = weight;
   weight = sign(block, lane) * std::max(1.0, h->unit > 0 ? energy / h->unit : 1.0);
-  p.shift = energy < h->unit ? h->geometry.overlap - overlap_of(h->number, body, h->geometry, energy) : 0;
+  const ContactGeometry middle = h->middle();
+  p.shift = energy < h->unit ? std::min(middle.overlap - overlap_of(h->number, body, middle, energy),
+                                        h->geometry.overlap)
+                             : 0;
   if (weight == before || step_.model != nullptr) return;
   // The friction spring keeps its force, but gains no energy.
   ContactState old, state{};
@@ -183,8 +196,9 @@ void ContactStages::balance(int body, Holding* holdings, int count, double left)
   } else {
     share(shifted, lacks);
     share((kStiffest - 1) * begun, [&](const Holding& h) { return (kStiffest - 1) * begins(h); });
-    const auto room = [&](const Holding& h) {
-      return h.begins || !(h.energy > 0) ? 0 : std::max(0.0, kStiffest * h.unit - h.target);
+    const auto room = [&](const Holding& h) {  // one that the wall stood back from wholly has it too
+      const bool none = h.begins || !(h.energy > 0 || (h.unit > 0 && pool_.flat(h.number) == nullptr));
+      return none ? 0 : std::max(0.0, kStiffest * h.unit - h.target);
     };
     double rest = 0;
     for (int k = 0; k < count; ++k)
@@ -218,10 +232,11 @@ void ContactStages::balance_found(int body, WallContact* found, const std::int32
     const Vec3 middle = middle_of(f.result);
     h.geometry = {-f.result.gap, f.result.normal, middle - load(p.record.x), middle - load(b.x)};
     FlatContact* flat = pool_.flat(number[k]);
+    const Vec3 velocity = load(b.velocity) + load(b.spin).cross(h.geometry.arm_b) - f.velocity;
+    h.ago = 0.5 * step_.dt * f.result.normal.dot(velocity);
     h.begins = !known[k] || !same_piece(number[k], body, f) || jumps(number[k], body, f);
     if (h.begins) {
       if (known[k]) left += leaving_energy(number[k], body);
-      const Vec3 velocity = load(b.velocity) + load(b.spin).cross(h.geometry.arm_b) - f.velocity;
       if (!known[k] && -f.result.gap <= kArrival * step_.dt * velocity.norm() + kSamePlane * b.radius) {
         h.begins = false;  // it came to the surface in this step
       }
@@ -239,16 +254,18 @@ void ContactStages::balance_found(int body, WallContact* found, const std::int32
     for (int k = 0; k < count; ++k) {
       Holding& h = holdings[k];
       if (const FlatContact* flat = pool_.flat(h.number)) {
-        h.energy = polygon_energy(h.number, body, 0);
+        const double moved = half_way(h.number, load(flat->polygon.normal));
+        h.energy = polygon_energy(h.number, body, moved, 0.5);
         h.unit = h.energy / flat->polygon.factor;
         continue;
       }
       const ContactBlock& block = pool_.block(h.number);
-      h.unit = unit_energy(h.number, body, h.geometry);
-      ContactGeometry now = h.geometry;
-      now.overlap -= partner(h.number).shift;
+      const ContactGeometry middle = h.middle();
+      h.unit = unit_energy(h.number, body, middle);
+      ContactGeometry felt = middle;
+      felt.overlap -= partner(h.number).shift;
       h.energy = std::abs(block.field[kWeight][ContactPool::lane(h.number)]) *
-                 (now.overlap == h.geometry.overlap ? h.unit : unit_energy(h.number, body, now));
+                 (felt.overlap == middle.overlap ? h.unit : unit_energy(h.number, body, felt));
     }
     balance(body, holdings, count, left);
   }

@@ -77,9 +77,15 @@ struct ContactStages::Holding {
   bool begins = false;       // with this piece of the wall, at a finite overlap
   bool negative = false;     // takes others off
   ContactGeometry geometry;  // before the wall stands back
-  double unit = 0;           // energy without shift, at weight 1
+  double ago = 0;            // how much deeper it was half a step ago
+  double unit = 0;           // energy without shift, at weight 1, then
   double energy = 0;         // as it is
   double target = 0;
+  ContactGeometry middle() const {
+    ContactGeometry g = geometry;
+    g.overlap = std::max(0.0, g.overlap + ago);
+    return g;
+  }
 };
 
 }  // namespace nurbs

@@ -171,6 +171,7 @@ void SurfaceSearch::touch_vertex(int number) {
     if (!patch_.edges()[e].inner && climbs(e, number, f.normal)) weight -= 1 - patch_.edges()[e].sides;
   }
   weight -= climbing_faces(number, f.normal);
+  if (weight == 0 && finds_sharp(deepest)) touch_between_ridges(number);
   if (weight == 0) return;
   add_vertex(f, weight, v, SurfaceContact::vertex);
 }

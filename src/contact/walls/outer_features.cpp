@@ -295,6 +295,7 @@ void SurfaceSearch::touch_outer_edge(int number, const Arc& arc, bool active) {
     edges_[piece.edge].state = f.along >= piece.from && f.along <= piece.to ? MetEdge::along
                                : (f.along < piece.from) == same_way         ? MetEdge::before
                                                                             : MetEdge::beyond;
+    if (edges_[piece.edge].state != MetEdge::along) edges_[piece.edge].past = f;
     if (f.along > low && f.along < high && f.along >= piece.from && f.along <= piece.to &&
         (owner < 0 || piece.edge < owner))
       owner = piece.edge;
@@ -332,16 +333,18 @@ void SurfaceSearch::touch_outer_edge(int number, const Arc& arc, bool active) {
   }
 }
 
-// A vertex all of whose edges stand out; false where one does not.
+// A vertex all of whose edges stand out, or a peak between ridges and valleys that no piece of it leads out of;
+// false at any other.
 bool SurfaceSearch::touch_outer_vertex(int number, const Vec3& guess) {
   const MeshPatch::Vertex& v = patch_.vertices()[number];
   const Cone cone = cone_at(number);
   if (cone == Cone::around) return false;
   if (is_on_line(number)) return true;  // a place of an edge, no more
   Arc arc;
+  bool valleys = false;
   for (int i = 0; i < v.edges && cone == Cone::other; ++i) {
     const MeshPatch::Edge& e = patch_.edges()[patch_.edge_at(v.first_edge + i)];
-    if (!e.inner && !outer_arc(e, &arc)) return false;
+    valleys = valleys || (!e.inner && !outer_arc(e, &arc));
   }
   // Of its pieces' contacts the shallowest leads out of all of them. Those further away than a few times
   // their depth have no shorter way out here.
@@ -366,7 +369,7 @@ bool SurfaceSearch::touch_outer_vertex(int number, const Vec3& guess) {
     const int e = patch_.edge_at(v.first_edge + i);
     if (patch_.edges()[e].inner) continue;
     offer(edges_[e].contact);
-    if (edges_[e].state == MetEdge::clear) return true;
+    if (edges_[e].state == MetEdge::clear) return !valleys;
   }
   for (int i = 0; i < v.cells; ++i)
     offer(planes_[patch_.cells()[patch_.cell_at(v.first_cell + i)].plane].contact);
@@ -377,6 +380,7 @@ bool SurfaceSearch::touch_outer_vertex(int number, const Vec3& guess) {
   bool own = find_only_way_out(particle_, v.x, guess, from, &f);
   if (!own || (!f.touching && !is_normal(f.normal))) {
     f = find_highest_point_contact(particle_, v.x, ways.data(), static_cast<int>(ways.size()), most, from);
+    if (valleys && (f.gap < -kPoked * radius_ || f.normal.dot(particle_.x - v.x) <= 0)) return false;
     // Where f is highest at the border of the normals and goes on to rise, an edge has the contact; it may go
     // on along a crease only, as where the body's edge crosses one of the vertex's beyond its other end.
     const auto goes_on = [&](const Vec3& e) {
@@ -394,7 +398,37 @@ bool SurfaceSearch::touch_outer_vertex(int number, const Vec3& guess) {
   }
   for (int i = 0; i < count; ++i)
     if (near[i]->gap < most) drop(near[i], best);
-  return true;
+  return best >= 0 || !valleys;
+}
+
+// A peak between ridges that is in a sharp edge of the body: each ridge has the edge past the peak, and for
+// every normal of the edge one of them climbs, so that no piece has a contact. As the edge goes on it comes to
+// one of the ridges; until then the contact is the shallowest of theirs, at the peak.
+bool SurfaceSearch::touch_between_ridges(int number) {
+  const MeshPatch::Vertex& v = patch_.vertices()[number];
+  const FeatureContact* shallowest = nullptr;
+  const auto is_near = [&](int contact) {
+    const SurfaceContact* c = kept(contact);
+    return c && (on_wall(*c) - v.x).norm() <= -kNearVertex * c->gap;
+  };
+  for (int i = 0; i < v.edges; ++i) {
+    const int e = patch_.edge_at(v.first_edge + i);
+    const MetEdge& met = edges_[e];
+    Arc arc;
+    if (patch_.edges()[e].inner || !outer_arc(patch_.edges()[e], &arc)) continue;
+    if (met.state != (away(patch_.edges()[e], number) > 0 ? MetEdge::before : MetEdge::beyond)) return false;
+    if (!shallowest || met.past.gap > shallowest->gap) shallowest = &met.past;
+  }
+  if (!shallowest || shallowest->gap < -kPoked * radius_) return false;
+  for (int i = 0; i < v.edges; ++i)
+    if (is_near(state(patch_.edge_at(v.first_edge + i)) == MetEdge::unmet
+                    ? -1
+                    : edges_[patch_.edge_at(v.first_edge + i)].contact))
+      return false;
+  for (int i = 0; i < v.cells; ++i)
+    if (is_near(planes_[patch_.cells()[patch_.cell_at(v.first_cell + i)].plane].contact)) return false;
+  if (is_clear_of(particle_, &v.x, 1)) return false;
+  return add_vertex(*shallowest, 1, v, SurfaceContact::vertex) >= 0;
 }
 
 }  // namespace nurbs

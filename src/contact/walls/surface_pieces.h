@@ -33,6 +33,7 @@ struct ActivePlane {
 struct MetEdge {
   enum State { unmet, unknown, clear, along, before, beyond } state = unmet;  // beyond: past v[1]
   int contact = -1;
+  FeatureContact past;  // of an edge that stands out, met before or beyond: where its line has it
 };
 
 // From the point of an edge that is nearest to x.
@@ -173,6 +174,7 @@ class SurfaceSearch {
               const Arc& arc);
   void touch_outer_edge(int number, const Arc& arc, bool active);
   bool touch_outer_vertex(int number, const Vec3& guess);
+  bool touch_between_ridges(int number);
 
   static constexpr double kNearVertex = 4;     // overlaps: contacts that a way out there may be shorter than
   static constexpr double kOneSide = 1e-9;     // rad: square to an edge
