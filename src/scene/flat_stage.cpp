@@ -117,6 +117,8 @@ void ContactStages::stand_at(double shift, int a, int lane, Results* results) {
   Partner& wall = partner(-1 - a);
   const double way = shift - wall.shift;
   wall.shift = shift;
+  // A polygon may be made there next.
+  if (wall.region) wall.region->origin -= way * results->normal_of(lane);
   results->gap[lane] += way;
   results->touching[lane] = results->gap[lane] < 0;
   for (int k = 0; k < 3; ++k) results->point[k][lane] -= 0.5 * way * results->normal[k][lane];
@@ -420,7 +422,7 @@ bool ContactStages::remake(ContactBlock& block, int lane, FlatContact& flat, Pol
   const auto find = [&](double reach) {
     return find_polygon(a, b, state.normal, overlap, reach * overlap, &flat.polygon, &polygon);
   };
-  if (!find(kKeptReach)) return false;
+  if (!find(kKeptReach) && !find(kReach)) return false;  // a feature shorter than the reach is none
   // A face that a line rolls on to is a new polygon.
   if (flat.polygon.rolling != 0 && polygon.rolling == 0 && !find(2 * kReach)) return false;
   polygon.factor = flat.polygon.factor;

@@ -192,7 +192,7 @@ void SurfaceWall::find_for(int body, const ContactStages::Step& step,
     motion_at(c, r.point_a, body, meshes, &f);
   }
   const bool mesh = kind_ == Kind::mesh, cylinder = kind_ == Kind::cylinder;
-  stages->give(body, head, found_, contacts_.count, cylinder || (mesh && edged(*particle.shape)), mesh);
+  stages->give(body, head, found_, contacts_.count, cylinder || edged(*particle.shape), mesh);
 }
 
 // What a body keeps of a tube from step to step, if it does.

@@ -158,13 +158,17 @@ bool SurfaceSearch::stand_on(int number) {
     const double reach = stands ? kKeptReach : kReach;
     double gap = 0, clear = 0;
     Vec3 on_body = Vec3::Zero();
-    if (!polygon_over(region, -reach * met.result.gap, &gap, &on_body, &clear)) {
+    if (!polygon_over(region, -reach * met.result.gap, &gap, &on_body, &clear) &&
+        !(stands && polygon_over(region, -kReach * met.result.gap, &gap, &on_body))) {
       plane.pointed = stands ? -kFarAway : path_ + clear;
       plane.pointed_normal = met.normal;
       return false;
     }
     if (!over) {  // the plane's deepest point is beside the wall; the polygon's is on it
-      if (!polygon_over(region, -reach * gap, &gap, &on_body)) return false;
+      const double from = gap;
+      if (!polygon_over(region, -reach * from, &gap, &on_body) &&
+          !(stands && polygon_over(region, -kReach * from, &gap, &on_body)))
+        return false;
       return add_plane(number, triangle_under(number, on_body), true, gap, on_body);
     }
   }
