@@ -3,6 +3,7 @@
 
 #include <Eigen/Eigenvalues>
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "nurbs/gauss_rule.h"
@@ -11,26 +12,32 @@
 namespace nurbs {
 namespace {
 
-constexpr double kIntegralRoundoff = 1e-15;                         // of a patch's integral
-constexpr int kMostQuartered = 20000, kMostQuarteredPerPatch = 50;  // cells of a body; some 40 are usual at a
-                                                                    // singular corner, none elsewhere
+constexpr double kIntegralRoundoff = 1e-15;  // of a patch's integral
+constexpr int kMaxHalvings = 16;  // of a cell in either direction; reached only at a singular patch corner
+constexpr int kMostHalved = 20000, kMostHalvedPerPatch = 50;  // cells of a body; some 40 are usual at a
+                                                              // singular corner, none elsewhere
 
 // Volume, first moments x y z, second moments xx yy zz xy xz yz.
 using Moments = Eigen::Array<double, 10, 1>;
 
-struct Square {
-  double u0, v0, size;  // a square of the patch's parameters
+struct Rectangle {
+  double u0, v0, size_u, size_v;  // a rectangle of the patch's parameters
+  std::array<Rectangle, 2> halves(bool along_u) const {
+    const double hu = along_u ? 0.5 * size_u : size_u, hv = along_u ? size_v : 0.5 * size_v;
+    return {Rectangle{u0, v0, hu, hv}, Rectangle{u0 + size_u - hu, v0 + size_v - hv, hu, hv}};
+  }
 };
 
-Moments integrate_cell(const BezierPatch& patch, const Square& cell, const GaussRule& rule,
+Moments integrate_cell(const BezierPatch& patch, const Rectangle& cell, const GaussRule& rule,
                        const Vec3& reference) {
   Moments sum = Moments::Zero();
+  const double area = cell.size_u * cell.size_v;
   for (size_t i = 0; i < rule.nodes.size(); ++i) {
     for (size_t j = 0; j < rule.nodes.size(); ++j) {
       const Jet1 s =
-          evaluate1(patch, cell.u0 + cell.size * rule.nodes[i], cell.v0 + cell.size * rule.nodes[j]);
+          evaluate1(patch, cell.u0 + cell.size_u * rule.nodes[i], cell.v0 + cell.size_v * rule.nodes[j]);
       const Vec3 x = s.s - reference;
-      const double f = rule.weights[i] * rule.weights[j] * cell.size * cell.size * x.dot(s.su.cross(s.sv));
+      const double f = rule.weights[i] * rule.weights[j] * area * x.dot(s.su.cross(s.sv));
       Moments m;
       m << f / 3, f / 4 * x[0], f / 4 * x[1], f / 4 * x[2], f / 5 * x[0] * x[0], f / 5 * x[1] * x[1],
           f / 5 * x[2] * x[2], f / 5 * x[0] * x[1], f / 5 * x[0] * x[2], f / 5 * x[1] * x[2];
@@ -40,27 +47,34 @@ Moments integrate_cell(const BezierPatch& patch, const Square& cell, const Gauss
   return sum;
 }
 
-Moments integrate_adaptively(const BezierPatch& patch, const Square& cell, const GaussRule& rule,
-                             const Vec3& reference, const Moments& whole, const Moments& allowed,
-                             int halvings, int* left) {
-  const double h = 0.5 * cell.size;
-  const Square quarters[4] = {{cell.u0, cell.v0, h},
-                              {cell.u0, cell.v0 + h, h},
-                              {cell.u0 + h, cell.v0, h},
-                              {cell.u0 + h, cell.v0 + h, h}};
-  Moments parts[4], sum = Moments::Zero();
-  for (int q = 0; q < 4; ++q) {
-    parts[q] = integrate_cell(patch, quarters[q], rule, reference);
-    sum += parts[q];
+// A cell is halved in the direction in which that changes most: next to a heavy control point the surface has
+// its bend in a strip of the parameters.
+struct AdaptiveRule {
+  const BezierPatch& patch;
+  const GaussRule& rule;
+  const Vec3& reference;
+  const Moments& allowed;
+  int* left;  // cells
+
+  // `halvings`: how often the cell may be halved in u and in v.
+  Moments run(const Rectangle& cell, const Moments& whole, const std::array<int, 2>& halvings) const {
+    Moments parts[2][2], sum[2];
+    double change[2];
+    for (const int way : {0, 1}) {
+      const std::array<Rectangle, 2> halves = cell.halves(way == 0);
+      for (int k = 0; k < 2; ++k) parts[way][k] = integrate_cell(patch, halves[k], rule, reference);
+      sum[way] = parts[way][0] + parts[way][1];
+      change[way] = halvings[way] > 0 ? ((sum[way] - whole).abs() / allowed).maxCoeff() : 0;
+    }
+    // Overflows make no number: halving would not end that.
+    if (--*left < 0 || !(std::max(change[0], change[1]) > 1)) return sum[0] + sum[1] - whole;
+    const int way = change[0] >= change[1] ? 0 : 1;
+    std::array<int, 2> less = halvings;
+    --less[way];
+    const std::array<Rectangle, 2> halves = cell.halves(way == 0);
+    return run(halves[0], parts[way][0], less) + run(halves[1], parts[way][1], less);
   }
-  // Overflows make no number: halving would not end that, but ten times.
-  if (halvings == 0 || --*left < 0 || !((sum - whole).abs() > allowed).any()) return sum;
-  sum.setZero();
-  for (int q = 0; q < 4; ++q) {
-    sum += integrate_adaptively(patch, quarters[q], rule, reference, parts[q], allowed, halvings - 1, left);
-  }
-  return sum;
-}
+};
 
 // The same patch in other parameters, u -> c u / (1 + (c - 1) u) and v likewise, in which its corners weigh
 // about the same: weights of 1e6 : 1 crowd it into 1e-6 of its parameters, which no node of a rule meets and
@@ -117,7 +131,7 @@ MassProperties from_moments(const Moments& m, const Vec3& reference) {
 
 }  // namespace
 
-MassProperties integrate_mass(const std::vector<BezierPatch>& given) {
+MassProperties integrate_mass(const std::vector<BezierPatch>& given, bool* done) {
   std::vector<BezierPatch> patches;
   patches.reserve(given.size());
   for (const BezierPatch& patch : given) patches.push_back(patch.rational ? with_even_weights(patch) : patch);
@@ -127,7 +141,7 @@ MassProperties integrate_mass(const std::vector<BezierPatch>& given) {
     GaussRule& rule = rules[rule_size(patch)];
     if (rule.nodes.empty()) rule = gauss_rule(rule_size(patch));
   }
-  const Square all{0, 0, 1};
+  const Rectangle all{0, 0, 1, 1};
   std::vector<Moments> whole;
   Moments total = Moments::Zero(), largest = Moments::Zero();
   for (const BezierPatch& patch : patches) {
@@ -138,13 +152,16 @@ MassProperties integrate_mass(const std::vector<BezierPatch>& given) {
   if (!(total[0] != 0)) return {};
   // Patches that cancel leave a volume below which there is round-off only.
   const Moments allowed = (kMomentTolerance * moment_scales(total)).max(kIntegralRoundoff * largest);
-  int left = kMostQuartered + kMostQuarteredPerPatch * static_cast<int>(patches.size());
+  int left = kMostHalved + kMostHalvedPerPatch * static_cast<int>(patches.size());
   total.setZero();
   for (size_t p = 0; p < patches.size(); ++p) {
-    total += patches[p].rational ? integrate_adaptively(patches[p], all, rules[rule_size(patches[p])],
-                                                        reference, whole[p], allowed, kMaxHalvings, &left)
-                                 : whole[p];
+    if (patches[p].rational)
+      total += AdaptiveRule{patches[p], rules[rule_size(patches[p])], reference, allowed, &left}.run(
+          all, whole[p], {kMaxHalvings, kMaxHalvings});
+    else
+      total += whole[p];
   }
+  if (done) *done = left >= 0;
   return from_moments(total, reference);
 }
 

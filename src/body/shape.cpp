@@ -257,7 +257,9 @@ void orient_and_weigh(Draft& draft) {
   const double size = sides.norm();
   if (!(sides.minCoeff() > kLeastVolume * size))
     throw ShapeError("the patches enclose no volume: they are flat");
-  s.mass = integrate_mass(s.patches);
+  bool done = true;
+  s.mass = integrate_mass(s.patches, &done);
+  if (!done) draft.warnings.push_back("the weights are too uneven for mass and inertia to be right to 1e-11");
   if (s.mass.volume < 0) {
     turn_surfaces(draft, std::vector<bool>(s.surfaces.size(), true));
     s.mass.volume = -s.mass.volume;

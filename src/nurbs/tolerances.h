@@ -41,7 +41,6 @@ constexpr double kSmallKink = 0.1;        // rad: larger ones are edges, not imp
 
 // --- mass
 constexpr double kMomentTolerance = 1e-12;  // of each moment, per integration cell
-constexpr int kMaxHalvings = 10;            // of a cell; reached only at a singular patch corner
 constexpr double kUnevenWeights = 10;  // ratio of a patch's ends, on average, from which it is integrated in
                                        // parameters in which they weigh the same
 constexpr double kMomentRoundoff = 1e-13;  // relative: products of inertia and differences of moments below

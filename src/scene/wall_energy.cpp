@@ -146,9 +146,9 @@ void ContactStages::hold(Holding* h, int body, double energy) {
   const double before = weight;
   weight = sign(block, lane) * std::max(1.0, h->unit > 0 ? energy / h->unit : 1.0);
   const ContactGeometry middle = h->middle();
-  p.shift = energy < h->unit ? std::min(middle.overlap - overlap_of(h->number, body, middle, energy),
-                                        h->geometry.overlap)
-                             : 0;
+  p.shift = energy < h->unit
+                ? std::min(middle.overlap - overlap_of(h->number, body, middle, energy), h->geometry.overlap)
+                : 0;
   if (weight == before || step_.model != nullptr) return;
   // The friction spring keeps its force, but gains no energy.
   ContactState old, state{};

@@ -333,8 +333,8 @@ void SurfaceSearch::touch_outer_edge(int number, const Arc& arc, bool active) {
   }
 }
 
-// A vertex all of whose edges stand out, or a peak between ridges and valleys that no piece of it leads out of;
-// false at any other.
+// A vertex all of whose edges stand out, or a peak between ridges and valleys that no piece of it leads out
+// of; false at any other.
 bool SurfaceSearch::touch_outer_vertex(int number, const Vec3& guess) {
   const MeshPatch::Vertex& v = patch_.vertices()[number];
   const Cone cone = cone_at(number);
@@ -402,8 +402,8 @@ bool SurfaceSearch::touch_outer_vertex(int number, const Vec3& guess) {
 }
 
 // A peak between ridges that is in a sharp edge of the body: each ridge has the edge past the peak, and for
-// every normal of the edge one of them climbs, so that no piece has a contact. As the edge goes on it comes to
-// one of the ridges; until then the contact is the shallowest of theirs, at the peak.
+// every normal of the edge one of them climbs, so that no piece has a contact. As the edge goes on it comes
+// to one of the ridges; until then the contact is the shallowest of theirs, at the peak.
 bool SurfaceSearch::touch_between_ridges(int number) {
   const MeshPatch::Vertex& v = patch_.vertices()[number];
   const FeatureContact* shallowest = nullptr;
