@@ -150,9 +150,13 @@ bool join_without_needless_knots(Draft& draft, double tolerance, bool closed) {
   std::vector<NurbsSurface> simpler;
   int removed = 0;
   for (const NurbsSurface& surface : draft.shape.surfaces) {
-    int in_u = 0, in_v = 0;
-    simpler.push_back(swap_uv(remove_knots_u(swap_uv(remove_knots_u(surface, &in_u)), &in_v)));
-    removed += in_u + in_v;
+    // The lower degree first: the points come out of it with less round-off for the other.
+    const bool turn = surface.degree_v < surface.degree_u;
+    int first = 0, second = 0;
+    const NurbsSurface once = remove_knots_u(turn ? swap_uv(surface) : surface, &first),
+                       twice = remove_knots_u(swap_uv(once), &second);
+    simpler.push_back(turn ? twice : swap_uv(twice));
+    removed += first + second;
   }
   if (removed == 0) return false;
   // One without gaps stays so: supports cost more where there are any.

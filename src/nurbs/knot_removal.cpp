@@ -9,7 +9,8 @@ namespace nurbs {
 namespace {
 
 constexpr double kKnotRemoval = 1e-14;  // of the largest coordinate, and of weights, times the degree
-constexpr double kJoinedWeights = 10;   // largest over smallest: an arc of 168 degrees
+constexpr double kJoinedWeights = 10;   // largest over smallest: an arc of 168 degrees; more if the spans'
+                                        // own, that of a linear weight, make it so
 constexpr double kSliver = 1e-3;        // of both spans: one that is joined even if that takes ...
 constexpr double kSliverWeights = 1e9;  // ... such weights
 
@@ -96,7 +97,7 @@ bool join(const Span& left, const Span& right, double reach, Span& out) {
   }
   const bool sliver = std::min(left.length(), right.length()) <= kSliver * length;
   return weights_of(out.curves).spread() <=
-         (sliver ? kSliverWeights : std::max({kJoinedWeights, of_left.spread(), of_right.spread()}));
+         (sliver ? kSliverWeights : std::max(kJoinedWeights, of_left.spread() * of_right.spread()));
 }
 
 std::vector<Span> spans_of(const NurbsSurface& s) {

@@ -9,8 +9,8 @@ namespace nurbs {
 // with their full multiplicity. `removed` receives how many places between spans are gone; 0: the surface is
 // returned as it came. A span is joined to the next if both come out of their union, cut again, to
 // kKnotRemoval times the degree of the largest coordinate, and if that needs no weights further
-// apart than kJoinedWeights, or than they were, unless one is a sliver beside the other. O(n) for n control
-// points, times the degree squared.
+// apart than kJoinedWeights, or than a linear weight's would be, unless one is a sliver beside the other.
+// O(n) for n control points, times the degree squared.
 NurbsSurface remove_knots_u(const NurbsSurface& surface, int* removed);
 
 }  // namespace nurbs

@@ -445,6 +445,27 @@ TEST(Connectivity, NeedlessKnotsOfEveryFaceAreRemoved) {
     }
 }
 
+// ... or has its own weights at every corner, so that the sides of a joint run at different speeds.
+TEST(Connectivity, NeedlessKnotsBetweenUnevenWeightsAreRemoved) {
+  Random random(13);
+  for (double most : {4.0, 10.0, 100.0}) {
+    Surfaces body;
+    for (int face = 0; face < 8; ++face) {
+      const Vec3 a((face & 1) ? -1 : 1, 0, 0), b(0, (face & 2) ? -1 : 1, 0), c(0, 0, (face & 4) ? -1 : 1);
+      std::vector<Vec4> points;
+      for (const Vec3& x : {a, c, b, c}) {
+        const double w = random.log_uniform(1 / most, most);
+        points.emplace_back(w * x[0], w * x[1], w * x[2], w);
+      }
+      body.push_back(bezier_surface(1, 1, points));
+      for (int k = 0; k < 4; ++k)
+        body.back() = swap_uv(insert_knot_u(body.back(), random.uniform(0.02, 0.98)));
+    }
+    ASSERT_EQ(error_of(body), "accepted") << most;
+    EXPECT_EQ(build(body)->patches.size(), 8u) << most;
+  }
+}
+
 // Knots so large that there is none between two of them: cutting ends, and what can't be cut is refused.
 TEST(Connectivity, LargeKnotsEndCutting) {
   for (double large : {1e3, 1e11, 1e13, 1e15}) {
