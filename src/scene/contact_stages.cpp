@@ -497,7 +497,11 @@ void ContactStages::compute_block(ContactBlock& block) {
     } else {
       solve_lane(block, lane, results);
     }
-    if (left.any) settle_left(block, lane, results, left);
+    if (left.any) {
+      settle_left(block, lane, results, left);
+      // A listed one was a polygon still when the others were counted.
+      if (a < -1) counts_.value[ContactCounts::contacts] += share(a, b) * results.touching[lane];
+    }
     stand_off(block, lane, results);
     if (step_.setup) {
       const bool first = results.touching[lane] != 0 && block.field[kStateField][lane] == 0;

@@ -639,6 +639,56 @@ TEST(SurfaceSearch, NeedlesInAValleyMeetItsFacesOnly) {
   EXPECT_LE(phantoms, 2);  // of those that reach round the border of the wall
 }
 
+// A peak between ridges and valleys in turn, in a body's sharp edge or beside it: each ridge may have the
+// edge past the peak, while one of them climbs along every normal of the edge. A box had no contact there
+// then.
+TEST(SurfaceSearch, PeaksBetweenRidgesInASharpEdge) {
+  const Vec3 peak(0.8, 0, 0.1963);
+  const std::vector<Vec3> round = {{0, -0.8, 0.0306}, {0.8, -0.8, -0.219}, {1.6, -0.8, 0.0628},
+                                   {1.6, 0, -0.1287}, {1.6, 0.8, 0.153},   {0.8, 0.8, -0.2214},
+                                   {0, 0.8, 0.1517},  {0, 0, -0.2602}};
+  Mesh mesh;
+  for (std::size_t k = 0; k < 8; ++k) mesh.add(peak, round[k], round[(k + 1) % 8]);
+  const Vec3 half(1, 0.8, 0.6);
+  const auto shape = make_shape("box", box(half));
+  // Past both ridges; deep enough in the one face for its way out to lead through the other.
+  const Sum past =
+                search({shape.get(),
+                        1,
+                        {0.84133857, 0.14511646, 1.51318718},
+                        Quat(0.14369818857095248, -0.831981555847496, -0.153482138714979, 0.513420640826294)},
+                       mesh),
+            face = search({shape.get(),
+                           1,
+                           {-0.01458845, -0.6642325, 1.005267588},
+                           Quat(-0.70601771611554, 0.706969444463862, 0.022448042510401, -0.035061011293245)},
+                          mesh);
+  ASSERT_EQ(past.count, 1);
+  EXPECT_NEAR(past.deepest, 0.0101, 1e-3);
+  ASSERT_EQ(face.count, 1);
+  EXPECT_NEAR(face.deepest, 0.0072, 1e-3);
+
+  Random random(19);
+  int met = 0, missed = 0;
+  for (int trial = 0; trial < 20000; ++trial) {
+    Particle p{shape.get(), 1, Vec3::Zero(), random.turn()};
+    const Vec3 down = p.q.conjugate() * -Vec3::UnitZ();  // the edge that is lowest, and a point of it
+    const int along = random.below(3);
+    Vec3 at;
+    for (int k = 0; k < 3; ++k)
+      at[k] = k == along ? random.uniform(-0.9, 0.9) * half[k]
+                         : (down[k] > 0 ? 1 : -1) * (half[k] - random.log_uniform(1e-4, 1e-2));
+    p.x = peak - p.q * at;
+    const bool alone = std::none_of(round.begin(), round.end(), [&](const Vec3& x) {
+      return ((p.q.conjugate() * (x - p.x)).cwiseAbs() - half).maxCoeff() < 0;
+    });
+    met += alone;
+    missed += alone && search(p, mesh).count == 0;
+  }
+  EXPECT_GT(met, 10000);
+  EXPECT_EQ(missed, 0);  // once 140
+}
+
 TEST(SurfaceSearch, RidgeValleyAndVertex) {
   Particle ball;
   ball.shape = test::sphere().get();

@@ -152,28 +152,32 @@ void SurfaceSearch::touch_vertex(int number) {
     deepest = std::min(deepest, met.result.gap);
     if (met.result.gap > shallowest->result.gap) shallowest = &met;
   }
-  if (finds_sharp(deepest) && touch_outer_vertex(number, shallowest->normal)) return;
+  const bool sharp = finds_sharp(deepest);
+  if (sharp && touch_outer_vertex(number, shallowest->normal)) return;
   if (claimed) return;
   if (edged(*particle_.shape) && lies_under(number)) {
     if (const ActivePlane* over = plane_over(v))
       add_vertex(at_plane(*over), 1, v, SurfaceContact::under_vertex);
     return;
   }
+  if (!touch_indexed_vertex(number, shallowest->normal) && sharp) touch_between_ridges(number);
+}
+
+// The vertex by its index; false where it has no contact.
+bool SurfaceSearch::touch_indexed_vertex(int number, const Vec3& guess) {
+  const MeshPatch::Vertex& v = patch_.vertices()[number];
   for (int i = 0; i < v.edges; ++i)
-    if (state(patch_.edge_at(v.first_edge + i)) == MetEdge::clear) return;
+    if (state(patch_.edge_at(v.first_edge + i)) == MetEdge::clear) return false;
   SurfacePoint start;
-  const FeatureContact f = find_point_contact(particle_, v.x, shallowest->normal, settings_,
-                                              point_for(shallowest->normal, &start));
-  if (!f.touching) return;
+  const FeatureContact f = find_point_contact(particle_, v.x, guess, settings_, point_for(guess, &start));
+  if (!f.touching) return false;
   int weight = 1;
   for (int i = 0; i < v.edges; ++i) {
     const int e = patch_.edge_at(v.first_edge + i);
     if (!patch_.edges()[e].inner && climbs(e, number, f.normal)) weight -= 1 - patch_.edges()[e].sides;
   }
   weight -= climbing_faces(number, f.normal);
-  if (weight == 0 && finds_sharp(deepest)) touch_between_ridges(number);
-  if (weight == 0) return;
-  add_vertex(f, weight, v, SurfaceContact::vertex);
+  return weight != 0 && add_vertex(f, weight, v, SurfaceContact::vertex) >= 0;
 }
 
 // Whether a corner of the body is in a pit below a vertex: beyond the ends of all its edges, so that no

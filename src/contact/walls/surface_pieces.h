@@ -139,6 +139,7 @@ class SurfaceSearch {
   void touch_edge(int number);
   bool covered(const FeatureContact& f, const std::vector<Stretch>& line) const;
   void touch_vertex(int number);
+  bool touch_indexed_vertex(int number, const Vec3& guess);
   bool lies_under(int number) const;
   const ActivePlane* plane_over(const MeshPatch::Vertex& v) const;
   MetEdge::State state(int edge) const;
