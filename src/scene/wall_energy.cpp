@@ -172,7 +172,7 @@ void ContactStages::balance(int body, Holding* holdings, int count, double left)
   for (int k = 0; k < count; ++k) {
     Holding& h = holdings[k];
     if (h.negative) {
-      left += h.begins ? h.unit : 0;
+      left += h.more * h.unit;
     } else {
       h.target = h.begins ? h.unit : h.energy;
       (h.begins ? begun : held) += h.target;
@@ -228,13 +228,16 @@ void ContactStages::balance_found(int body, WallContact* found, const std::int32
     h = Holding{};
     h.number = number[k];
     h.negative = f.weight < 0;
-    if (h.negative) block.field[kWeight][lane] = f.weight;
+    const double before = known[k] ? block.field[kWeight][lane] : 0;
     const Vec3 middle = middle_of(f.result);
     h.geometry = {-f.result.gap, f.result.normal, middle - load(p.record.x), middle - load(b.x)};
     FlatContact* flat = pool_.flat(number[k]);
     const Vec3 velocity = load(b.velocity) + load(b.spin).cross(h.geometry.arm_b) - f.velocity;
     h.ago = 0.5 * step_.dt * f.result.normal.dot(velocity);
-    h.begins = !known[k] || !same_piece(number[k], body, f) || jumps(number[k], body, f);
+    h.begins = !known[k] || (before < 0) != h.negative || !same_piece(number[k], body, f) ||
+               jumps(number[k], body, f);
+    if (h.negative) h.more = (h.begins ? 0 : before) - f.weight;
+    change = change || h.more != 0;
     if (h.begins) {
       if (known[k]) left += leaving_energy(number[k], body);
       if (!known[k] && -f.result.gap <= kArrival * step_.dt * velocity.norm() + kSamePlane * b.radius) {
@@ -249,6 +252,7 @@ void ContactStages::balance_found(int body, WallContact* found, const std::int32
       }
       stand_closer(number[k], body, h.geometry);
     }
+    if (h.negative || before < 0) block.field[kWeight][lane] = f.weight;
   }
   if (change && !step_.setup) {
     for (int k = 0; k < count; ++k) {

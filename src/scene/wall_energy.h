@@ -75,7 +75,8 @@ double overlap_holding(double energy, double overlap, const Unit& unit) {
 struct ContactStages::Holding {
   std::int32_t number = 0;
   bool begins = false;       // with this piece of the wall, at a finite overlap
-  bool negative = false;     // takes others off
+  bool negative = false;     // takes others off ...
+  double more = 0;           // ... more times than before
   ContactGeometry geometry;  // before the wall stands back
   double ago = 0;            // how much deeper it was half a step ago
   double unit = 0;           // energy without shift, at weight 1, then

@@ -107,6 +107,7 @@ void SurfaceSearch::touch_edge(int number) {
               : !(f.along > 0)        ? MetEdge::before
               : !(f.along < e.length) ? MetEdge::beyond
                                       : MetEdge::along;
+  met.past = f;
   if (met.state != MetEdge::along) return;
   if (e.sides == 1 && covered(f, straight_on(number))) return;
   // It may meet the line beyond, and be deepest over the edge.

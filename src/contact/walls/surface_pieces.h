@@ -33,7 +33,7 @@ struct ActivePlane {
 struct MetEdge {
   enum State { unmet, unknown, clear, along, before, beyond } state = unmet;  // beyond: past v[1]
   int contact = -1;
-  FeatureContact past;  // of an edge that stands out, met before or beyond: where its line has it
+  FeatureContact past;  // met before or beyond: where the edge's line has it
 };
 
 // From the point of an edge that is nearest to x.
@@ -128,6 +128,7 @@ class SurfaceSearch {
   int add(const SurfaceContact& c);
   void leave_out_dropped();
   void touch_any(const std::vector<int>& active);
+  void touch_any_end(const std::vector<int>& active);
 
   // Edges and vertices by their index.
   bool range(const MeshPatch::Edge& e, Range* r) const;

@@ -67,9 +67,37 @@ void SurfaceSearch::touch_any(const std::vector<int>& active) {
     const int crossed = cell_with(p, crossing(p, met.deepest, met.result.gap));
     if (crossed >= 0) shallowest = p, cell = crossed;
   }
-  if (cell < 0) return;
+  if (cell < 0) return touch_any_end(active);
   const ActivePlane& met = planes_[shallowest];
   add_plane(shallowest, patch_.cells()[cell].triangle, false, met.result.gap, met.deepest);
+}
+
+// ... or of the shallowest edge whose line has the body just past an end, of those beside which it meets a
+// face.
+void SurfaceSearch::touch_any_end(const std::vector<int>& active) {
+  const FeatureContact* shallowest = nullptr;
+  int at = -1;
+  for (const int p : active) {
+    const MeshPatch::Plane& plane = patch_.planes()[p];
+    for (int i = plane.first_edge; i < plane.first_edge + plane.edges; ++i) {
+      const int number = patch_.edge_in(i);
+      const MetEdge& met = edges_[number];
+      if (met.state != MetEdge::before && met.state != MetEdge::beyond) continue;
+      if (met.past.gap < -kPoked * radius_ || (shallowest && met.past.gap <= shallowest->gap)) continue;
+      const MeshPatch::Edge& e = patch_.edges()[number];
+      const int v = e.v[met.state == MetEdge::beyond];
+      const Vec3& x = patch_.vertices()[v].x;
+      const Vec3 foot = particle_.x + met.past.on_body - met.past.gap * met.past.normal;
+      if ((foot - x).norm() > -kNearVertex * met.past.gap) continue;
+      bool meets = false;
+      for (int s = e.first_side; s < e.first_side + e.sides && !meets; ++s)
+        meets = meets_cell(patch_.side(s).cell);
+      if (!meets) continue;
+      shallowest = &met.past;
+      at = v;
+    }
+  }
+  if (shallowest) add_vertex(*shallowest, 1, patch_.vertices()[at], SurfaceContact::vertex);
 }
 
 const PairMemory* SurfaceSearch::start_for(const Vec3& normal) const {
