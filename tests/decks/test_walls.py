@@ -336,6 +336,34 @@ class BentMeshes(unittest.TestCase):
         t = result.thermo
         return t["ke"] + t["er"] + t["mgz"] * gravity / 9.81 + t["led[1]"] + t["led[2]"]
 
+    def test_hills_keep_the_energy_of_what_falls_on_them(self):
+        """Elastic. A box over a peak in its edge and a cone whose rim passed a corner lost their only contact there, 28 and 8 %;
+        a contact that was to take over found no room, 13 and 14 %; a tablet gained 9 % from a vertex that is taken off twice."""
+        hills = {count: sheet(count, 4, lambda x, y, r=np.random.RandomState(1), known={}: known.setdefault((x, y), r.uniform(-h, h)))
+                 for count, h in ((10, 0.3), (40, 0.02))}
+        cone = shapes.revolved([(0, -0.4), (1, -0.4), (0, 1.2)])
+        for body, mass, count, pose, motion in (
+                (deck.box_shape(1, 0.8, 0.6), 3.84, 10,
+                 (0.790260839377, 0.073713286629, 1.8, -0.161364881132, -0.8215333284, 0.039505231294, 0.545420665327),
+                 (0.177580165165, 0.249164591949, -1.0, 2.528325706806, -0.248634777715, 0.043668993178)),
+                (deck.box_shape(1, 0.8, 0.6), 3.84, 10,
+                 (-0.066265898067, -0.618652923572, 1.8, -0.730746078149, 0.327060245685, 0.470986282031, -0.370423658937),
+                 (0.064256497183, -0.051848150999, -1.0, -0.6069983982, 0.106222724035, -1.525680316229)),
+                (cone, 1.6755, 10, (-0.564686778271, 0.301664260164, 1.8, 0.425092974685, -0.287679887424, 0.678121599105, -0.526010781327),
+                 (-0.274648831032, 0.144834774844, -1.0, -0.083601618832, -0.699513273373, 0.93928814701)),
+                (cone, 1.6755, 10, (0.294782573121, -0.292468042933, 1.8, 0.279934275472, -0.527497448042, 0.595061021379, 0.53785279079),
+                 (0.0168017891, -0.154810365673, -1.0, 0.673616900555, 0.929161937267, 1.281898299188)),
+                (deck.shape_file("tablet", 1, height=1, rim=0.2), 3.0385, 40,
+                 (-0.05028239554, -0.701737565611, 1.8, -0.185182269712, 0.311435969734, -0.859153981458, -0.36134415712),
+                 (-0.173083862964, 0.285090017236, -1.0, -1.118406431281, 0.498523623619, -0.706093869937))):
+            law = f"kn {1e4 * mass} kt 0 mu 0"
+            t = run("mesh m", [(1, 1, 1, 1.0, 1.0, *pose)], [(1, *motion)], mesh=hills[count], body=body, law=law, gravity=None, dt=2e-4,
+                    before=MESH, steps="run 16000", thermo="c_ke c_er", box=((-9, 9), (-9, 9), (-9, 9))).thermo
+            energy = t["ke"] + t["er"]
+            print(f"    a bounce on hills: {energy[-1] / energy[0] - 1:+.1e}")
+            self.assertLess(t["led[1]"][-1], 1e-12)
+            self.assertAlmostEqual(energy[-1] / energy[0], 1, delta=3e-3)
+
     def test_spikes_throw_nothing_back_faster(self):
         """Faces, rims and straight sides that fall on spikes: the force acts at the spike. At some corner or end of what lies on it, it
         turned the body the wrong way, and a cube flew off with up to 260 times its energy, a tablet with 3,500 times."""
