@@ -253,6 +253,7 @@ class ContactStages {
   void apply_law(ContactBlock& block, int first, const Results& results);
 
   // A contact model in the law's place: model_stage.cpp.
+  ModelMemory& begin_memory(ContactBlock& block, int lane);
   ModelMemory& model_memory(const ContactBlock& block, int lane) {
     return *reinterpret_cast<ModelMemory*>(pool_.memory(block, lane));
   }
@@ -269,6 +270,7 @@ class ContactStages {
   SphereCurvatures point_spheres(int a, int b) const;                            // of a polygon's points ...
   SphereCurvatures inherited_spheres(const double* memory, int a, int b) const;  // ... or those remembered
   bool knows_spheres(const double* memory) const;
+  void set_spheres(std::int32_t number, const SphereCurvatures& spheres);
   void forget_spheres(ContactBlock& block, int lane);  // of a body that is another now
   SphereCurvatures model_curvatures(const ContactBlock& block, int lane,
                                     const ContactGeometry& geometry) const;
@@ -319,6 +321,7 @@ class ContactStages {
                std::int32_t* number) const;
   void inherit(std::int32_t number, int body, const Former* former, int formers, const WallContact& found);
   void count_listed(const WallContact& found, std::int32_t number, int body);
+  void level_spheres(int body, const WallContact* found, const std::int32_t* number, int count);
   void update_listed(std::int32_t number, int body, const WallContact& found, bool known);
   bool may_follow(std::int32_t number, int body, const WallContact& found) const;
 

@@ -77,6 +77,24 @@ SphereCurvatures ContactStages::point_spheres(int a, int b) const {
   return flat_curvatures(wall ? record(b).radius : smaller_radius(a, b), wall);
 }
 
+void ContactStages::set_spheres(std::int32_t number, const SphereCurvatures& spheres) {
+  ContactBlock& block = pool_.block(number);
+  const int lane = ContactPool::lane(number);
+  ModelMemory& own = begin_memory(block, lane);
+  own.curvature_a = spheres.a;
+  own.curvature_b = spheres.b;
+}
+
+// A contact's memory, empty if it is a new contact, or one of another model, by a restart.
+ModelMemory& ContactStages::begin_memory(ContactBlock& block, int lane) {
+  ModelMemory& own = model_memory(block, lane);
+  if (own.kind != step_.model->kind()) {
+    std::fill_n(pool_.memory(block, lane), pool_.memory_size(), 0.0);
+    own.kind = step_.model->kind();
+  }
+  return own;
+}
+
 void ContactStages::forget_spheres(ContactBlock& block, int lane) {
   if (step_.model == nullptr) return;
   ModelMemory& own = model_memory(block, lane);
@@ -212,11 +230,7 @@ PolygonState ContactStages::give_model(ContactPolygon* polygon, int a, int b, do
 void ContactStages::ask_model(ContactBlock& block, int lane, const ContactGeometry& g, double damper_share,
                               bool moves_on) {
   const int a = block.a[lane], b = block.b[lane];
-  ModelMemory& own = model_memory(block, lane);
-  if (own.kind != step_.model->kind()) {  // a new contact, or one of another model, by a restart
-    std::fill_n(pool_.memory(block, lane), pool_.memory_size(), 0.0);
-    own.kind = step_.model->kind();
-  }
+  ModelMemory& own = begin_memory(block, lane);
   const ModelMemory old = own;
   ContactState before{}, state{};
   if (step_.ledger) block.get(lane, kStateField, kContactStateSize, &before);

@@ -267,6 +267,7 @@ void ContactStages::give(int body, std::int32_t* head, WallContact* found, int c
     partner(n).proof.contact = n;
     if (!known[k] && reentrant && !step_.setup) inherit(n, body, former, formers, f);
   }
+  if (reentrant) level_spheres(body, found, number, count);
   for (int i = 0; i < formers; ++i)
     if (!former[i].taken) end_listed(former[i].number);
   std::int32_t* link = head;
@@ -275,6 +276,31 @@ void ContactStages::give(int body, std::int32_t* head, WallContact* found, int c
     link = &partner(number[k]).next;
   }
   *link = 0;
+}
+
+// What is taken off is as stiff as the softest contact that it is taken off from, and never pulls more than
+// those push: on its flat face a body has another radius than at its edges.
+void ContactStages::level_spheres(int body, const WallContact* found, const std::int32_t* number, int count) {
+  if (step_.model == nullptr || step_.model->volume_radius()) return;
+  const BodyRecord& b = record(body);
+  double sharpest = 0;
+  for (int k = 0; k < count; ++k) {
+    if (found[k].weight < 0) continue;
+    ContactBlock& block = pool_.block(number[k]);
+    const int lane = ContactPool::lane(number[k]);
+    const Vec3 middle = middle_of(found[k].result);
+    const double* memory = pool_.memory(block, lane);
+    SphereCurvatures spheres = point_spheres(-1 - number[k], body);
+    if (pool_.flat(number[k]) == nullptr)
+      spheres = knows_spheres(memory)
+                    ? inherited_spheres(memory, -1 - number[k], body)
+                    : model_curvatures(block, lane,
+                                       {-found[k].result.gap, found[k].result.normal,
+                                        middle - load(partner(number[k]).record.x), middle - load(b.x)});
+    sharpest = std::max(sharpest, spheres.a + spheres.b);
+  }
+  for (int k = 0; k < count; ++k)
+    if (found[k].weight < 0) set_spheres(number[k], {0, sharpest});
 }
 
 // Ends a contact that was not found again.
