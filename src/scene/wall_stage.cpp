@@ -239,6 +239,14 @@ void ContactStages::give(int body, std::int32_t* head, WallContact* found, int c
     partner(number[k]).age = age;
     bind_listed(number[k], body);
   }
+  // Some surface is counted twice and taken off: no contact is on its own.
+  const bool reentrant = std::any_of(former, former + formers, [](const Former& f) { return f.subtracts; }) ||
+                         std::any_of(found, found + count, [](const WallContact& w) { return w.weight < 0; });
+  if (reentrant && step_.model != nullptr) {  // before what they hold is shared
+    for (int k = 0; k < count; ++k)
+      if (!known[k] && !step_.setup) inherit(number[k], body, former, formers, found[k]);
+    level_spheres(body, found, number, count);
+  }
   if (balanced) {
     double left = 0;
     for (int i = 0; i < formers && !step_.setup; ++i)
@@ -246,9 +254,6 @@ void ContactStages::give(int body, std::int32_t* head, WallContact* found, int c
     balance_found(body, found, number, known, count, left);
   }
 
-  // Some surface is counted twice and taken off: no contact is on its own.
-  const bool reentrant = std::any_of(former, former + formers, [](const Former& f) { return f.subtracts; }) ||
-                         std::any_of(found, found + count, [](const WallContact& w) { return w.weight < 0; });
   for (int k = 0; k < count; ++k) {
     const WallContact& f = found[k];
     const std::int32_t n = number[k];
@@ -265,9 +270,9 @@ void ContactStages::give(int body, std::int32_t* head, WallContact* found, int c
       count_listed(f, n, body);
     }
     partner(n).proof.contact = n;
-    if (!known[k] && reentrant && !step_.setup) inherit(n, body, former, formers, f);
+    if (!known[k] && reentrant && !step_.setup && step_.model == nullptr)
+      inherit(n, body, former, formers, f);
   }
-  if (reentrant) level_spheres(body, found, number, count);
   for (int i = 0; i < formers; ++i)
     if (!former[i].taken) end_listed(former[i].number);
   std::int32_t* link = head;
@@ -281,7 +286,7 @@ void ContactStages::give(int body, std::int32_t* head, WallContact* found, int c
 // What is taken off is as stiff as the softest contact that it is taken off from, and never pulls more than
 // those push: on its flat face a body has another radius than at its edges.
 void ContactStages::level_spheres(int body, const WallContact* found, const std::int32_t* number, int count) {
-  if (step_.model == nullptr || step_.model->volume_radius()) return;
+  if (step_.model->volume_radius()) return;
   const BodyRecord& b = record(body);
   double sharpest = 0;
   for (int k = 0; k < count; ++k) {
