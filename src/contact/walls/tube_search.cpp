@@ -96,14 +96,15 @@ class Tube {
       const double turn = std::remainder(cross - low.angle, M_PI),
                    secant = low.slope / (low.slope - high.slope);
       double t = k % 2 == 0 ? (turn < 0 ? turn + M_PI : turn) / width : secant;
-      if (!(t > 1e-7 && t < 1 - 1e-7)) t = 0.5;
+      const bool inside = t > 1e-7 && t < 1 - 1e-7;
+      if (!inside) t = 0.5;
       const double angle = low.angle + t * width;
       const Reach next = look(angle, t < 0.5 ? &low : &high);
       if (!(next.value > level)) return false;
       const Vec3 d = direction(angle);
       const double least = d.dot(apart_) + std::max(d.dot(low.on_body), d.dot(high.on_body));
       *found = next;
-      if (next.value - least <= noise || width < 1e-12) {
+      if ((k % 2 == 0 && inside && next.value - least <= noise) || width < 1e-12) {
         // Of the points that are as far out, that where F does not turn.
         const Vec3 e = std::cos(angle) * v_ - std::sin(angle) * u_;
         const double l = e.dot(apart_ + low.on_body), h = e.dot(apart_ + high.on_body);
