@@ -271,7 +271,16 @@ class TubeSearch {
       if (kind_[k] == kRound && arc == nullptr) arc = open_arc(k, survey);
       if (kind_[k] >= kMixed) note_open(from, to, kind_[k] == kMixed, survey);
       if (kind_[k] == kRound || kind_[k] == kMixed) bound_ = std::max({bound_, from.value, to.value});
-      if (from.slope > 0 && to.slope <= 0 && kind_[k] != kAway) meet(settle(from, to), kind_[k], arc);
+      if (kind_[k] != kAway) {
+        if (from.slope > 0 && to.slope <= 0)
+          meet(settle(from, to), kind_[k], arc);
+        else if (const Known* top = to.slope == 0 ? known_at(to.angle) : nullptr) {
+          Reach least = from;  // F falls to begin with
+          if (from.slope == 0 && tube_.bottom(from, to, -HUGE_VAL, &least))
+            least_ = std::min(least_, least.value);
+          meet(*top, kind_[k], arc);
+        }
+      }
       least_ = std::min(least_, to.value);
     }
     if (last_top_ > -HUGE_VAL) add(last_);
@@ -495,6 +504,11 @@ class TubeSearch {
     if (start == nullptr) return tube_.look(angle, &low);
     start_.where = start->contact.where;
     return tube_.look(angle, &start_);
+  }
+  const Known* known_at(double angle) const {
+    const Known* found =
+        std::find_if(known_, known_ + known_count_, [&](const Known& k) { return k.angle == angle; });
+    return found == known_ + known_count_ ? nullptr : found;
   }
   Reach reach_of(const Known& k) const {
     Reach r;
