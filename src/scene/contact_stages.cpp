@@ -554,6 +554,33 @@ bool ContactStages::is_where_left(int a, const ContactGeometry& geometry, double
   return same_geometry(*state, geometry, same);
 }
 
+namespace {
+
+// Forces on A and B and their torques. Not to be inlined: what is contracted to fused operations depends on
+// where that is, and a run in two parts moves as one to the last bit.
+struct ContactLoads {
+  Triple<Wide> force, torque_a, torque_b;
+  Wide pressed;
+  void scatter(double (&load_a)[kWidth][8], double (&load_b)[kWidth][8]) const {
+    const Wide zero{};
+    nurbs::scatter({force.x, force.y, force.z, torque_b.x, torque_b.y, torque_b.z, pressed, all<Wide>(1)},
+                   load_b);
+    nurbs::scatter({zero - force.x, zero - force.y, zero - force.z, torque_a.x, torque_a.y, torque_a.z,
+                    pressed, all<Wide>(1)},
+                   load_a);
+  }
+};
+[[gnu::noinline]] ContactLoads loads_of(const ContactStateOf<Wide>& state, const Wide& sign) {
+  ContactLoads l;
+  l.pressed = sign * state.normal_force;
+  l.force = l.pressed * state.normal + sign * state.tangential_force;
+  l.torque_a = cross(l.force, state.arm_a);
+  l.torque_b = cross(state.arm_b, l.force);
+  return l;
+}
+
+}  // namespace
+
 // The state stays as it is when the bodies are where it was made, so that a run in two parts moves as one;
 // else it is made anew.
 void ContactStages::start_run(ContactBlock& block, int lane, const Results& results) {
@@ -582,17 +609,15 @@ void ContactStages::start_run(ContactBlock& block, int lane, const Results& resu
   if (state.active == 0) {
     return;
   }
-  const int sign_of = sign(block, lane);
-  const Vec3 force = sign_of * force_on_b(state);
-  double load_b[8], load_a[8];
-  store(force, load_b);
-  store(Vec3(load(state.arm_b).cross(force)), load_b + 3);
-  store(Vec3(-force), load_a);
-  store(Vec3(-load(state.arm_a).cross(force)), load_a + 3);
-  load_a[6] = load_b[6] = sign_of * state.normal_force;
-  load_a[7] = load_b[7] = 1;
-  add_load(a, load_a);
-  add_load(b, load_b);
+  ContactStateOf<Wide> wide;
+  double fields[kContactStateSize];
+  std::memcpy(fields, &state, sizeof fields);
+  for (int k = 0; k < kContactStateSize; ++k) reinterpret_cast<Wide*>(&wide)[k] = all<Wide>(fields[k]);
+  const ContactLoads loads = loads_of(wide, all<Wide>(sign(block, lane)));
+  double load_a[kWidth][8], load_b[kWidth][8];
+  loads.scatter(load_a, load_b);
+  add_load(a, load_a[0]);
+  add_load(b, load_b[0]);
 }
 
 // Ends the law's part of a contact that has opened since the last step.
@@ -670,9 +695,9 @@ void ContactStages::apply_law(ContactBlock& block, int first, const Results& res
   ContactWorkOf<Wide> work{};
   advance_linear<Wide, ledger>(law, g, a, b, step_.dt, &state, &work);
 
-  const Wide sign = select(index < 0.0, all<Wide>(-1), all<Wide>(1)), pressed = sign * state.normal_force;
-  const Triple<Wide> force = pressed * state.normal + sign * state.tangential_force;
-  const Triple<Wide> torque_a = cross(force, g.arm_a), torque_b = cross(g.arm_b, force);
+  const Wide sign = select(index < 0.0, all<Wide>(-1), all<Wide>(1));
+  const ContactLoads loads = loads_of(state, sign);
+  const Triple<Wide>&force = loads.force, &torque_a = loads.torque_a, &torque_b = loads.torque_b;
   const Wide sum = force.x + force.y + force.z + torque_a.x + torque_a.y + torque_a.z + torque_b.x +
                    torque_b.y + torque_b.z + state.rate + work.damping + work.friction;
   const WideMask good = touching & ((sum - sum) == 0.0);
@@ -681,10 +706,7 @@ void ContactStages::apply_law(ContactBlock& block, int first, const Results& res
     std::memcpy(&block.field[kStateField + k][first], &keep, sizeof keep);
   }
   double load_a[kWidth][8], load_b[kWidth][8];
-  scatter({force.x, force.y, force.z, torque_b.x, torque_b.y, torque_b.z, pressed, all<Wide>(1)}, load_b);
-  scatter({zero - force.x, zero - force.y, zero - force.z, torque_a.x, torque_a.y, torque_a.z, pressed,
-           all<Wide>(1)},
-          load_a);
+  loads.scatter(load_a, load_b);
   for (int l = 0; l < kWidth; ++l) {
     if (results.touching[first + l] == 0) continue;
     const int body_a = block.a[first + l], body_b = block.b[first + l];

@@ -199,6 +199,15 @@ class TubeSearch {
         tube_(particle, pose, distance_ > 0 ? pose.apart : Vec3::Zero()),
         out_(*out) {}
 
+  // In the order of their angles, however they were found.
+  void sort_around() {
+    const auto before = [&](const SurfaceContact& a, const SurfaceContact& b) {
+      return tube_.angle(-a.normal) < tube_.angle(-b.normal);
+    };
+    if (!std::is_sorted(out_.contact, out_.contact + out_.count, before))
+      std::sort(out_.contact, out_.contact + out_.count, before);
+  }
+
   // F - radius is a function on the circle, and the potentials of its maxima less those of its minima are as
   // smooth as that is: where a maximum and a minimum meet and are gone, nothing is lost. So minima between
   // contacts count against them.
@@ -678,6 +687,7 @@ double find_in_tube(const Particle& particle, const CylinderPose& pose, const Co
     out->count = 0;
     clear = search.find_all(maxima, count, survey);
   }
+  search.sort_around();
   search.take_off_minima();
   return clear;
 }
