@@ -113,6 +113,9 @@ void SurfaceSearch::touch_edge(int number) {
   // It may meet the line beyond, and be deepest over the edge.
   const Vec3 ends[2] = {a, a + e.length * e.direction};
   if (finds_sharp(deepest) && is_clear_of(particle_, ends, 2)) return;
+  for (int i = 0; i < e.sides && !smooth; ++i)
+    if (planes_[plane_of(e, i)].result.gap == f.gap && reaches_round(plane_of(e, i), f.on_body, f.gap))
+      return;
   add_edge(f, weight, e, smooth ? SurfaceContact::edge : SurfaceContact::under_edge);
 }
 

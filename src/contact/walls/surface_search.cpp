@@ -445,7 +445,8 @@ bool SurfaceSearch::passes_by(int number, const Vec3& deepest, double gap) const
   const MeshPatch::Plane& plane = patch_.planes()[number];
   const Vec3 x = particle_.x + deepest;
   if (cell_with(number, x) < 0) return false;
-  if (meets_cells(number)) return reaches_round(number, deepest, gap);
+  if (reaches_round(number, deepest, gap)) return true;
+  if (meets_cells(number)) return false;
   // A sharp body may be in the wall by a neighbour of the cell that it is over, and meet the face nowhere.
   for (int i = 0; i < plane.cells; ++i) {
     const int here = patch_.cell_in(plane.first + i);
@@ -461,24 +462,36 @@ bool SurfaceSearch::passes_by(int number, const Vec3& deepest, double gap) const
   return true;
 }
 
-// Whether a body whose deepest point is over a face has gone round a border of the wall to there, and has
-// little of the face but what the border meets: the point of the face above the deepest one is not in the
-// body.
+// Whether a body whose deepest point is over a face has gone there round a border of the wall, or from
+// without round an edge whose other face bends towards the side of its centre, and has little of the face but
+// what the edge meets: the point of the face above the deepest one is not in the body.
 bool SurfaceSearch::reaches_round(int number, const Vec3& deepest, double gap) const {
   const MeshPatch::Plane& plane = patch_.planes()[number];
   const Vec3& normal = planes_[number].normal;
-  if (!is_thinner(gap) || !(normal.dot(deepest) < 0)) return false;
+  if (!(normal.dot(deepest) < 0)) return false;
   const Vec3 above = particle_.x + deepest - gap * normal, way = crossing(number, deepest, gap) - above;
   double last = 0;
-  bool border = false;
+  bool round = false;
   for (int i = 0; i < plane.edges; ++i) {
     const MeshPatch::Edge& e = patch_.edges()[patch_.edge_in(plane.first_edge + i)];
     if (e.inner) continue;
     const Vec3 to = patch_.vertices()[e.v[0]].x - above, across = e.direction.cross(normal);
     const double t = to.dot(across) / way.dot(across), along = (t * way - to).dot(e.direction);
-    if (t > last && t < 1 && along >= 0 && along <= e.length) last = t, border = e.sides == 1;
+    if (!(t > last && t < 1 && along >= 0 && along <= e.length)) continue;
+    last = t;
+    round = e.sides == 1 ? is_thinner(gap)
+                         : e.sides == 2 && is_without(e, plane_of(e, 0) == number ? 1 : 0, normal);
   }
-  return border && is_clear_of(particle_, &above, 1);
+  return round && is_clear_of(particle_, &above, 1);
+}
+
+// Whether the other face of an edge, its side `side`, bends towards `normal`, of the first, and the body's
+// centre is on its far side.
+bool SurfaceSearch::is_without(const MeshPatch::Edge& e, int side, const Vec3& normal) const {
+  if (!(into(e, side).dot(normal) > 0)) return false;
+  const Vec3& other = patch_.planes()[plane_of(e, side)].normal;
+  const double centre = other.dot(particle_.x - patch_.vertices()[e.v[0]].x);
+  return centre * other.dot(into(e, 1 - side)) < 0;
 }
 
 // Whether no direction parts the body from a cell.
