@@ -689,6 +689,42 @@ TEST(SurfaceSearch, PeaksBetweenRidgesInASharpEdge) {
   EXPECT_EQ(missed, 0);  // once 140
 }
 
+// Outside an icosahedron a needle is behind the planes of faces that it passes: it had a second contact, with
+// the face at the other side, half of its size deep.
+TEST(SurfaceSearch, NeedlesBesideASolidMeetNoFaceFromWithin) {
+  const double golden = 0.5 * (1 + std::sqrt(5.0)), size = 0.8 / std::sqrt(1 + golden * golden);
+  std::vector<Vec3> corners;
+  for (int k = 0; k < 12; ++k) {
+    Vec3 x;
+    x[k % 3] = 0;
+    x[(k + 1) % 3] = (k / 3 & 1) ? size : -size;
+    x[(k + 2) % 3] = (k / 6 & 1) ? size * golden : -size * golden;
+    corners.push_back(x);
+  }
+  Mesh mesh;
+  const auto is_side = [&](int i, int j) { return (corners[i] - corners[j]).norm() < 2.1 * size; };
+  for (int i = 0; i < 12; ++i)
+    for (int j = i + 1; j < 12; ++j)
+      for (int k = j + 1; k < 12; ++k)
+        if (is_side(i, j) && is_side(j, k) && is_side(i, k)) mesh.add(corners[i], corners[j], corners[k]);
+  ASSERT_EQ(mesh.triangles.size(), 20u);
+  const auto needle = make_shape("needle", exact_ellipsoid({1, 0.15, 0.15}));
+  const Sum one = search({needle.get(),
+                          1,
+                          {0.78688, 0.36755, 0.18539},
+                          Quat(-0.455516, 0.611776, 0.019618, -0.646414).normalized()},
+                         mesh),
+            other = search({needle.get(),
+                            1,
+                            {-0.29659, -0.66171, -0.43416},
+                            Quat(0.835206, 0.093879, -0.50639, -0.19284).normalized()},
+                           mesh);
+  EXPECT_EQ(one.count, 1);
+  EXPECT_NEAR(one.deepest, 0.00402, 1e-4);
+  EXPECT_EQ(other.count, 1);
+  EXPECT_NEAR(other.deepest, 0.00077, 1e-4);
+}
+
 TEST(SurfaceSearch, RidgeValleyAndVertex) {
   Particle ball;
   ball.shape = test::sphere().get();

@@ -122,7 +122,7 @@ class SurfaceSearch {
   void touch_face(int number);
   bool is_thinner(double gap) const { return -gap > particle_.scale * particle_.shape->inner_radius; }
   bool reaches_round(int number, const Vec3& deepest, double gap) const;
-  bool is_without(const MeshPatch::Edge& e, int side, const Vec3& normal) const;
+  bool crosses_wall(const Vec3& to) const;
   bool meets_cell(int number) const;
   bool passes_by(int number, const Vec3& deepest, double gap) const;
   bool add_plane(int number, int triangle, bool flat, double gap, const Vec3& on_body);

@@ -462,16 +462,16 @@ bool SurfaceSearch::passes_by(int number, const Vec3& deepest, double gap) const
   return true;
 }
 
-// Whether a body whose deepest point is over a face has gone there round a border of the wall, or from
-// without round an edge whose other face bends towards the side of its centre, and has little of the face but
-// what the edge meets: the point of the face above the deepest one is not in the body.
+// Whether a body whose deepest point is over a face has gone there round a border of the wall, or not through
+// the wall at all, as from without round what is a valley on the face's other side; and has little of the
+// face but what an edge meets: the point of the face above the deepest one is not in the body.
 bool SurfaceSearch::reaches_round(int number, const Vec3& deepest, double gap) const {
   const MeshPatch::Plane& plane = patch_.planes()[number];
   const Vec3& normal = planes_[number].normal;
   if (!(normal.dot(deepest) < 0)) return false;
   const Vec3 above = particle_.x + deepest - gap * normal, way = crossing(number, deepest, gap) - above;
   double last = 0;
-  bool round = false;
+  bool border = false;
   for (int i = 0; i < plane.edges; ++i) {
     const MeshPatch::Edge& e = patch_.edges()[patch_.edge_in(plane.first_edge + i)];
     if (e.inner) continue;
@@ -479,19 +479,18 @@ bool SurfaceSearch::reaches_round(int number, const Vec3& deepest, double gap) c
     const double t = to.dot(across) / way.dot(across), along = (t * way - to).dot(e.direction);
     if (!(t > last && t < 1 && along >= 0 && along <= e.length)) continue;
     last = t;
-    round = e.sides == 1 ? is_thinner(gap)
-                         : e.sides == 2 && is_without(e, plane_of(e, 0) == number ? 1 : 0, normal);
+    border = e.sides == 1;
   }
-  return round && is_clear_of(particle_, &above, 1);
+  return last > 0 && (border ? is_thinner(gap) : !crosses_wall(deepest)) && is_clear_of(particle_, &above, 1);
 }
 
-// Whether the other face of an edge, its side `side`, bends towards `normal`, of the first, and the body's
-// centre is on its far side.
-bool SurfaceSearch::is_without(const MeshPatch::Edge& e, int side, const Vec3& normal) const {
-  if (!(into(e, side).dot(normal) > 0)) return false;
-  const Vec3& other = patch_.planes()[plane_of(e, side)].normal;
-  const double centre = other.dot(particle_.x - patch_.vertices()[e.v[0]].x);
-  return centre * other.dot(into(e, 1 - side)) < 0;
+// Whether the line from the body's centre to a point of it goes through the wall.
+bool SurfaceSearch::crosses_wall(const Vec3& to) const {
+  return std::any_of(patch_.cells().begin(), patch_.cells().end(), [&](const MeshPatch::Cell& cell) {
+    const MeshPatch::Plane& plane = patch_.planes()[cell.plane];
+    const double from = plane.normal.dot(particle_.x - plane.origin), way = plane.normal.dot(to);
+    return from * (from + way) < 0 && in_cell(cell, particle_.x - from / way * to);
+  });
 }
 
 // Whether no direction parts the body from a cell.
