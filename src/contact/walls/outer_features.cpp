@@ -308,7 +308,8 @@ void SurfaceSearch::touch_outer_edge(int number, const Arc& arc, bool active) {
   const bool lies = face && face->active && !(opposite >= 0 && out_.contact[opposite].gap > f.gap) &&
                     instead_of(face->contact) < 0 && face->normal.dot(f.normal) > kSamePlane &&
                     (std::abs(into(e, end).dot(apart + f.on_body)) < kWithin * radius_ ||
-                     cell_with(plane_of(e, end), particle_.x + f.on_body) >= 0);
+                     cell_with(plane_of(e, end), particle_.x + f.on_body) >= 0) &&
+                    !passes_by(plane_of(e, end), f.on_body, f.gap);
   const auto gives_way = [&](int side) {
     return leads_in(beside[side], e, side, arc) || deeper(beside[side], f.gap);
   };
