@@ -389,7 +389,7 @@ int SurfaceSearch::cell_above_valley(int number) const {
     const int first = plane_of(e, 0);
     meets = meets || meets_cells(first == number ? plane_of(e, 1) : first);
   }
-  return meets || meets_cells(number) ? cell : -1;
+  return (meets || meets_cells(number)) && crosses_wall(met.deepest) ? cell : -1;
 }
 
 // Whether the body meets a cell of the plane.
@@ -481,7 +481,11 @@ bool SurfaceSearch::reaches_round(int number, const Vec3& deepest, double gap) c
     last = t;
     border = e.sides == 1;
   }
-  return last > 0 && (border ? is_thinner(gap) : !crosses_wall(deepest)) && is_clear_of(particle_, &above, 1);
+  if (last == 0) return false;
+  // Of a sharp body that is thick enough the border's own contact says more.
+  const bool passes =
+      (border && is_thinner(gap)) || (!(border && edged(*particle_.shape)) && !crosses_wall(deepest));
+  return passes && is_clear_of(particle_, &above, 1);
 }
 
 // Whether the line from the body's centre to a point of it goes through the wall.
