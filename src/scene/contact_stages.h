@@ -269,6 +269,7 @@ class ContactStages {
   ModelContact model_contact(int a, int b, const ContactGeometry& geometry, const ModelMemory& own) const;
   SphereCurvatures point_spheres(int a, int b) const;                            // of a polygon's points ...
   SphereCurvatures inherited_spheres(const double* memory, int a, int b) const;  // ... or those remembered
+  SphereCurvatures kept_spheres(const ContactBlock& block, int lane, const ContactGeometry& g) const;
   bool knows_spheres(const double* memory) const;
   void set_spheres(std::int32_t number, const SphereCurvatures& spheres);
   void forget_spheres(ContactBlock& block, int lane);  // of a body that is another now
@@ -321,6 +322,7 @@ class ContactStages {
                std::int32_t* number) const;
   void inherit(std::int32_t number, int body, const Former* former, int formers, const WallContact& found);
   void count_listed(const WallContact& found, std::int32_t number, int body);
+  ContactGeometry geometry_of(const WallContact& found, std::int32_t number, int body) const;
   void level_spheres(int body, const WallContact* found, const std::int32_t* number, int count);
   void update_listed(std::int32_t number, int body, const WallContact& found, bool known);
   bool may_follow(std::int32_t number, int body, const WallContact& found) const;

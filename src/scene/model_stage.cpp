@@ -165,12 +165,17 @@ SphereCurvatures ContactStages::inherited_spheres(const double* memory, int a, i
   return knows_spheres(memory) ? spheres_of(memory) : point_spheres(a, b);
 }
 
+// A contact's that has some, or those that it begins with.
+SphereCurvatures ContactStages::kept_spheres(const ContactBlock& block, int lane,
+                                             const ContactGeometry& g) const {
+  const double* memory = pool_.memory(block, lane);
+  return knows_spheres(memory) ? spheres_of(memory) : model_curvatures(block, lane, g);
+}
+
 // The same of a contact as it is.
 double ContactStages::model_energy(const ContactBlock& block, int lane, const ContactGeometry& g) const {
   const double* memory = pool_.memory(block, lane);
-  const SphereCurvatures spheres =
-      knows_spheres(memory) ? spheres_of(memory) : model_curvatures(block, lane, g);
-  return model_energy(block.a[lane], block.b[lane], memory, spheres, g);
+  return model_energy(block.a[lane], block.b[lane], memory, kept_spheres(block, lane, g), g);
 }
 
 // Of a polygon's points, each with the history of a memory.

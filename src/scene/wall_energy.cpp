@@ -229,8 +229,7 @@ void ContactStages::balance_found(int body, WallContact* found, const std::int32
     h.number = number[k];
     h.negative = f.weight < 0;
     const double before = known[k] ? block.field[kWeight][lane] : 0;
-    const Vec3 middle = middle_of(f.result);
-    h.geometry = {-f.result.gap, f.result.normal, middle - load(p.record.x), middle - load(b.x)};
+    h.geometry = geometry_of(f, number[k], body);
     FlatContact* flat = pool_.flat(number[k]);
     const Vec3 velocity = load(b.velocity) + load(b.spin).cross(h.geometry.arm_b) - f.velocity;
     h.ago = 0.5 * step_.dt * f.result.normal.dot(velocity);

@@ -283,25 +283,24 @@ void ContactStages::give(int body, std::int32_t* head, WallContact* found, int c
   *link = 0;
 }
 
+// Before the wall stands back.
+ContactGeometry ContactStages::geometry_of(const WallContact& found, std::int32_t number, int body) const {
+  const Vec3 middle = middle_of(found.result);
+  return {-found.result.gap, found.result.normal, middle - load(partner(number).record.x),
+          middle - load(record(body).x)};
+}
+
 // What is taken off is as stiff as the softest contact that it is taken off from, and never pulls more than
 // those push: on its flat face a body has another radius than at its edges.
 void ContactStages::level_spheres(int body, const WallContact* found, const std::int32_t* number, int count) {
   if (step_.model->volume_radius()) return;
-  const BodyRecord& b = record(body);
   double sharpest = 0;
   for (int k = 0; k < count; ++k) {
     if (found[k].weight < 0) continue;
-    ContactBlock& block = pool_.block(number[k]);
-    const int lane = ContactPool::lane(number[k]);
-    const Vec3 middle = middle_of(found[k].result);
-    const double* memory = pool_.memory(block, lane);
-    SphereCurvatures spheres = point_spheres(-1 - number[k], body);
-    if (pool_.flat(number[k]) == nullptr)
-      spheres = knows_spheres(memory)
-                    ? inherited_spheres(memory, -1 - number[k], body)
-                    : model_curvatures(block, lane,
-                                       {-found[k].result.gap, found[k].result.normal,
-                                        middle - load(partner(number[k]).record.x), middle - load(b.x)});
+    const SphereCurvatures spheres = pool_.flat(number[k]) != nullptr
+                                         ? point_spheres(-1 - number[k], body)
+                                         : kept_spheres(pool_.block(number[k]), ContactPool::lane(number[k]),
+                                                        geometry_of(found[k], number[k], body));
     sharpest = std::max(sharpest, spheres.a + spheres.b);
   }
   for (int k = 0; k < count; ++k)
@@ -339,12 +338,9 @@ void ContactStages::inherit(std::int32_t number, int body, const Former* former,
   ContactBlock& block = pool_.block(number);
   const int lane = ContactPool::lane(number);
   if (step_.model != nullptr) return take_over_model(pool_.memory(from, from_lane), block, lane);
-  const Vec3 middle = middle_of(found.result);
   const ContactCoefficients law = coefficients(block, lane);
-  take_over(law,
-            {-found.result.gap, found.result.normal, middle - load(partner(number).record.x),
-             middle - load(record(body).x)},
-            motion_of(partner(number).record), motion_of(record(body)), step_.dt, load(old.spring), &state);
+  take_over(law, geometry_of(found, number, body), motion_of(partner(number).record), motion_of(record(body)),
+            step_.dt, load(old.spring), &state);
   block.set(lane, kStateField, kContactStateSize, &state);
   if (step_.ledger && state.active != 0)
     dissipated_.damping -= sign(block, lane) * share(-1, body) * stored_energy(law, state).tangential_spring;

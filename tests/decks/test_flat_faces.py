@@ -599,23 +599,7 @@ class EveryFlatWall(unittest.TestCase):
     WALLS = {"plane": "fix w all wall/nurbs plane 0 0 0 0 0 1 {law}",
              "mesh": "fix m all mesh/surface file floor.stl type 1\nfix w all wall/nurbs mesh m {law}",
              "moving plane": "fix w all wall/nurbs plane 0 0 0 0 0 1 {law} move linear 1e-9 0 0"}
-    FLOOR = """solid floor
-facet normal 0 0 1
-outer loop
-vertex -9 -9 0
-vertex 9 -9 0
-vertex 9 9 0
-endloop
-endfacet
-facet normal 0 0 1
-outer loop
-vertex -9 -9 0
-vertex 9 9 0
-vertex -9 9 0
-endloop
-endfacet
-endsolid floor
-"""
+    FLOOR = meshes.ascii_stl([(-9, -9, 0), (9, -9, 0), (9, 9, 0), (-9, 9, 0)], [(0, 1, 2), (0, 2, 3)])
 
     def bounce(self, shape, atom_line, velocity, kn, steps, wall):
         law = f"kn {kn} kt {kn} mu 0"

@@ -36,15 +36,20 @@ int SurfaceSearch::first_plane_of(const MeshPatch::Vertex& v) const {
   return patch_.cells()[patch_.cell_at(v.first_cell)].plane;
 }
 
+// Of the planes at an edge, all met.
+int SurfaceSearch::shallowest_beside(const MeshPatch::Edge& e) const {
+  int shallowest = plane_of(e, 0);
+  for (int i = 1; i < e.sides; ++i) {
+    const int p = plane_of(e, i);
+    if (planes_[p].result.gap > planes_[shallowest].result.gap) shallowest = p;
+  }
+  return shallowest;
+}
+
 // A corner of the body sharper than its overlap is deep: f has no maximum between the planes, and the
 // shallower one takes over at once.
 FeatureContact SurfaceSearch::pointed(const MeshPatch::Edge& e) const {
-  const ActivePlane* shallowest = nullptr;
-  for (int i = 0; i < e.sides; ++i) {
-    const ActivePlane& met = planes_[plane_of(e, i)];
-    if (!shallowest || met.result.gap > shallowest->result.gap) shallowest = &met;
-  }
-  FeatureContact f = at_plane(*shallowest);
+  FeatureContact f = at_plane(planes_[shallowest_beside(e)]);
   f.along = e.direction.dot(particle_.x + f.on_body - patch_.vertices()[e.v[0]].x);
   return f;
 }
@@ -113,16 +118,14 @@ void SurfaceSearch::touch_edge(int number) {
   // It may meet the line beyond, and be deepest over the edge.
   const Vec3 ends[2] = {a, a + e.length * e.direction};
   if (finds_sharp(deepest) && is_clear_of(particle_, ends, 2)) return;
-  for (int i = 0; i < e.sides && !smooth; ++i)
-    if (planes_[plane_of(e, i)].result.gap == f.gap && reaches_round(plane_of(e, i), f.on_body, f.gap))
-      return;
+  if (!smooth && reaches_round(shallowest_beside(e), f.on_body, f.gap)) return;
   add_edge(f, weight, e, smooth ? SurfaceContact::edge : SurfaceContact::under_edge);
 }
 
 // Whether a point of a border lies within another cell: meshes that overlap themselves have no border
 // there.
 bool SurfaceSearch::covered(const FeatureContact& f, const std::vector<Stretch>& line) const {
-  const Vec3 y = particle_.x + f.on_body - f.gap * f.normal;
+  const Vec3 y = on_wall(f);
   const auto cell_at = [&](const Stretch& piece) {
     return patch_.side(patch_.edges()[piece.edge].first_side).cell;
   };

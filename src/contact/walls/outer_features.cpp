@@ -98,10 +98,6 @@ const SurfaceContact* SurfaceSearch::kept(int contact) const {
   return contact < 0 || dropped_[contact] ? nullptr : &out_.contact[contact];
 }
 
-Vec3 SurfaceSearch::on_wall(const SurfaceContact& c) const {
-  return particle_.x + c.on_body - c.gap * c.normal;
-}
-
 // From an edge into the cell of a side of it.
 Vec3 SurfaceSearch::into(const MeshPatch::Edge& e, int side) const {
   const MeshPatch::Side& s = patch_.side(e.first_side + side);
@@ -364,7 +360,7 @@ bool SurfaceSearch::touch_outer_vertex(int number, const Vec3& guess) {
       touched = true;
       most = std::max(most, c->gap);
     }
-    if ((on_wall(*c) - v.x).norm() <= -kNearVertex * c->gap) near[count++] = c;
+    if (is_near(*c, v.x)) near[count++] = c;
   };
   for (int i = 0; i < v.edges; ++i) {
     const int e = patch_.edge_at(v.first_edge + i);
@@ -405,31 +401,28 @@ bool SurfaceSearch::touch_outer_vertex(int number, const Vec3& guess) {
 // A peak between ridges that is in a sharp edge of the body: each ridge has the edge past the peak, and for
 // every normal of the edge one of them climbs, so that no piece has a contact. As the edge goes on it comes
 // to one of the ridges; until then the contact is the shallowest of theirs, at the peak.
-bool SurfaceSearch::touch_between_ridges(int number) {
+void SurfaceSearch::touch_between_ridges(int number) {
   const MeshPatch::Vertex& v = patch_.vertices()[number];
   const FeatureContact* shallowest = nullptr;
-  const auto is_near = [&](int contact) {
+  const auto has_contact = [&](int contact) {
     const SurfaceContact* c = kept(contact);
-    return c && (on_wall(*c) - v.x).norm() <= -kNearVertex * c->gap;
+    return c && is_near(*c, v.x);
   };
   for (int i = 0; i < v.edges; ++i) {
-    const int e = patch_.edge_at(v.first_edge + i);
-    const MetEdge& met = edges_[e];
+    const int number_of = patch_.edge_at(v.first_edge + i);
+    const MeshPatch::Edge& e = patch_.edges()[number_of];
+    const MetEdge& met = edges_[number_of];
     Arc arc;
-    if (patch_.edges()[e].inner || !outer_arc(patch_.edges()[e], &arc)) continue;
-    if (met.state != (away(patch_.edges()[e], number) > 0 ? MetEdge::before : MetEdge::beyond)) return false;
+    if (e.inner) continue;
+    if (has_contact(met.contact)) return;
+    if (!outer_arc(e, &arc)) continue;
+    if (met.state != (away(e, number) > 0 ? MetEdge::before : MetEdge::beyond)) return;
     if (!shallowest || met.past.gap > shallowest->gap) shallowest = &met.past;
   }
-  if (!shallowest || shallowest->gap < -kPoked * radius_) return false;
-  for (int i = 0; i < v.edges; ++i)
-    if (is_near(state(patch_.edge_at(v.first_edge + i)) == MetEdge::unmet
-                    ? -1
-                    : edges_[patch_.edge_at(v.first_edge + i)].contact))
-      return false;
+  if (!shallowest || shallowest->gap < -kPoked * radius_) return;
   for (int i = 0; i < v.cells; ++i)
-    if (is_near(planes_[patch_.cells()[patch_.cell_at(v.first_cell + i)].plane].contact)) return false;
-  if (is_clear_of(particle_, &v.x, 1)) return false;
-  return add_vertex(*shallowest, 1, v, SurfaceContact::vertex) >= 0;
+    if (has_contact(planes_[patch_.cells()[patch_.cell_at(v.first_cell + i)].plane].contact)) return;
+  if (!is_clear_of(particle_, &v.x, 1)) add_vertex(*shallowest, 1, v, SurfaceContact::vertex);
 }
 
 }  // namespace nurbs

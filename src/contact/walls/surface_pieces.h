@@ -134,6 +134,7 @@ class SurfaceSearch {
   // Edges and vertices by their index.
   bool range(const MeshPatch::Edge& e, Range* r) const;
   int first_plane_of(const MeshPatch::Vertex& v) const;
+  int shallowest_beside(const MeshPatch::Edge& e) const;
   FeatureContact pointed(const MeshPatch::Edge& e) const;
   FeatureContact at_plane(const ActivePlane& met) const;
   bool all_open(const MeshPatch::Edge& e) const;
@@ -160,7 +161,15 @@ class SurfaceSearch {
   bool outer_arc(const MeshPatch::Edge& e, Arc* arc) const;
   int plane_of(const MeshPatch::Edge& e, int side) const;
   const SurfaceContact* kept(int contact) const;
-  Vec3 on_wall(const SurfaceContact& c) const;
+  // Of a SurfaceContact or a FeatureContact.
+  template <class Contact>
+  Vec3 on_wall(const Contact& c) const {
+    return particle_.x + c.on_body - c.gap * c.normal;
+  }
+  template <class Contact>
+  bool is_near(const Contact& c, const Vec3& vertex) const {
+    return (on_wall(c) - vertex).norm() <= -kNearVertex * c.gap;
+  }
   Vec3 into(const MeshPatch::Edge& e, int side) const;
   const SurfaceContact* contact_beside(const MeshPatch::Edge& e, int side, const Arc& arc, double low,
                                        double high) const;
@@ -177,7 +186,7 @@ class SurfaceSearch {
               const Arc& arc);
   void touch_outer_edge(int number, const Arc& arc, bool active);
   bool touch_outer_vertex(int number, const Vec3& guess);
-  bool touch_between_ridges(int number);
+  void touch_between_ridges(int number);
 
   static constexpr double kNearVertex = 4;     // overlaps: contacts that a way out there may be shorter than
   static constexpr double kOneSide = 1e-9;     // rad: square to an edge

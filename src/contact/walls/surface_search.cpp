@@ -86,9 +86,7 @@ void SurfaceSearch::touch_any_end(const std::vector<int>& active) {
       if (met.past.gap < -kPoked * radius_ || (shallowest && met.past.gap <= shallowest->gap)) continue;
       const MeshPatch::Edge& e = patch_.edges()[number];
       const int v = e.v[met.state == MetEdge::beyond];
-      const Vec3& x = patch_.vertices()[v].x;
-      const Vec3 foot = particle_.x + met.past.on_body - met.past.gap * met.past.normal;
-      if ((foot - x).norm() > -kNearVertex * met.past.gap) continue;
+      if (!is_near(met.past, patch_.vertices()[v].x)) continue;
       bool meets = false;
       for (int s = e.first_side; s < e.first_side + e.sides && !meets; ++s)
         meets = meets_cell(patch_.side(s).cell);

@@ -210,20 +210,15 @@ class TubeSearch {
 
   // F - radius is a function on the circle, and the potentials of its maxima less those of its minima are as
   // smooth as that is: where a maximum and a minimum meet and are gone, nothing is lost. So minima between
-  // contacts count against them.
+  // contacts count against them. After sort_around().
   void take_off_minima() {
-    int order[kSurfaceContacts];
     double angle[kSurfaceContacts];
     const int count = out_.count;
     if (count < 2) return;
-    for (int k = 0; k < count; ++k) {
-      order[k] = k;
-      angle[k] = tube_.angle(-out_.contact[k].normal);
-    }
-    std::sort(order, order + count, [&](int a, int b) { return angle[a] < angle[b]; });
-    for (int k = 0; k < count; ++k) {
-      const int from = order[k], to = order[(k + 1) % count];
-      const double width = angle[to] - angle[from] + (k + 1 == count ? 2 * M_PI : 0);
+    for (int k = 0; k < count; ++k) angle[k] = tube_.angle(-out_.contact[k].normal);
+    for (int from = 0; from < count; ++from) {
+      const int to = (from + 1) % count;
+      const double width = angle[to] - angle[from] + (to == 0 ? 2 * M_PI : 0);
       if (width > kWidestGap) continue;
       const Reach low = reach_at_contact(from, angle[from]), high = reach_at_contact(to, angle[from] + width);
       Reach least;
@@ -408,8 +403,7 @@ class TubeSearch {
       }
       const Known top = settle(low, high);
       *clear = std::min(*clear, top.contact.gap);
-      bool known = false;
-      for (int i = 0; i < known_count_; ++i) known = known || known_[i].angle == top.angle;
+      const bool known = known_at(top.angle) != nullptr;
       if (!known && top.contact.gap < 0) return false;  // it is found as from scratch
       if (top.contact.gap >= 0) still_ = std::min(still_, top.contact.gap);
       met += known;
@@ -505,11 +499,10 @@ class TubeSearch {
   }
   // F at one of them.
   Reach reach_at(double angle, const Reach& low) {
+    if (const Known* known = known_at(angle)) return reach_of(*known);
     const Known* start = nullptr;
-    for (int i = 0; i < known_count_; ++i) {
-      if (known_[i].angle == angle) return reach_of(known_[i]);
+    for (int i = 0; i < known_count_; ++i)
       if (std::abs(known_[i].angle - angle) < angle - low.angle) start = &known_[i];
-    }
     if (start == nullptr) return tube_.look(angle, &low);
     start_.where = start->contact.where;
     return tube_.look(angle, &start_);
